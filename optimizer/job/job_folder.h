@@ -68,6 +68,7 @@
 #define JOB_THUMBNAIL "thumbnail.png" /* among the results: a small picture for lists */
 
 #define JOB_PDF_PROGRAM "weasyprint" /* makes report.pdf; the Debian package has the same name */
+#define JOB_BLEND_PROGRAM "blender"  /* makes cloth.blend of an export for Blender */
 
 /* Exit codes of the worker. */
 enum worker_exit {

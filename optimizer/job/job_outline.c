@@ -1,6 +1,7 @@
 #include "optimizer/job/job_outline.h"
 #include "optimizer/job/checks/job_faults.h"
 #include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_exports.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/job_scan.h"
@@ -31,6 +32,7 @@ static status take_sections(struct job_sections section, struct job_outline *o, 
     snprintf(o->geometry_job, sizeof o->geometry_job, "%s", section.scan->geometry_job);
     snprintf(o->profile_job, sizeof o->profile_job, "%s", section.fit->profile_job);
     o->export_pdf = section.results->export_pdf;
+    o->export_blend = section.results->exported[EXPORT_blender];
     job_sections_visit_files(&section, count_file, &n);
     o->file = calloc(n + 1, sizeof *o->file);
     if (o->file == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");

@@ -20,7 +20,7 @@ struct job_outline_file {
 struct job_outline {
     char sample[JOB_MAX_SAMPLE_BYTES];
     char geometry_job[JOB_MAX_ID_BYTES], profile_job[JOB_MAX_ID_BYTES]; /* "" when none is named */
-    bool export_pdf;                                                    /* report.pdf is wanted */
+    bool export_pdf, export_blend; /* report.pdf, and the file cloth.blend, are wanted */
     size_t n_file;
     struct job_outline_file *file;
 };

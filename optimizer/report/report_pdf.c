@@ -5,16 +5,11 @@
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/job_folder.h"
 
-#include <errno.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
-
-enum { WAIT_MS = 50, LONGEST_S = 300 };
 
 bool report_pdf_installed(char prefix[WORKER_PATH_BYTES])
 {
@@ -43,28 +38,13 @@ void report_pdf_paths(const struct worker_folder *folder, struct pdf_paths *p)
     worker_folder_path(folder, JOB_FOLDER_RESULTS, "report.pdf", p->to);
 }
 
-/* Waits for the end of the program. A program that takes too long, or belongs to a cancelled job, ends with the
- * worker. */
-static bool wait_for(const struct report *report, pid_t child)
-{
-    const struct timespec pause = {0, WAIT_MS * 1000000L};
-    for (int waited_ms = 0, how = 0; waited_ms < LONGEST_S * 1000; waited_ms += WAIT_MS) {
-        pid_t got = waitpid(child, &how, WNOHANG);
-        if (got == child) return WIFEXITED(how) && WEXITSTATUS(how) == 0;
-        if ((got < 0 && errno != EINTR) || progress_cancelled(&report->in.job->tools->progress)) return false;
-        nanosleep(&pause, NULL);
-    }
-    return false;
-}
-
 status report_pdf_write(struct report *report, struct error *err)
 {
     char prefix[WORKER_PATH_BYTES];
     struct pdf_paths path;
     if (!report->in.results->export_pdf || !report_pdf_installed(prefix)) return STATUS_OK;
     report_pdf_paths(report->in.job->tools->folder, &path);
-    if (report->in.pdf.pid > 0 && write(report->in.pdf.order_fd, "g", 1) == 1 && wait_for(report, report->in.pdf.pid) &&
-        access(path.part, F_OK) == 0) {
+    if (program_helper_run(&report->in.helper.pdf, &report->in.job->tools->progress) && access(path.part, F_OK) == 0) {
         status s = worker_folder_check(report->in.job->tools->folder, err);
         return s == STATUS_OK ? durable_rename(path.part, path.to, err) : s;
     }

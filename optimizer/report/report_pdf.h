@@ -1,6 +1,6 @@
 /* results/report.pdf: report.html as PDF, for jobs that ask for it. The program WeasyPrint makes it, which Selvedge
  * does not need otherwise (Debian package weasyprint). A worker in its sandbox starts no programs, so a helper process
- * with a sandbox of its own is started before (optimizer/worker/sandbox/pdf_process.h), and waits until the page is
+ * with a sandbox of its own is started before (optimizer/worker/sandbox/program_process.h), and waits until the page is
  * written. */
 #ifndef SELVEDGE_OPTIMIZER_REPORT_PDF_H
 #define SELVEDGE_OPTIMIZER_REPORT_PDF_H

@@ -164,7 +164,7 @@ static status do_report(struct pipeline *p, const struct taken *t, bool load, st
                                     .radius = &t->fit->radius,
                                     .validation = t->validation->model,
                                     .made = t->cloth,
-                                    .pdf = p->option->pdf,
+                                    .helper = p->option->helper,
                                     .n_input_warning = p->n_input_warning,
                                     .stage_wall_s = p->stage_wall_s,
                                     .work_s = p->plan->report_s};

@@ -9,7 +9,7 @@
 
 struct pipeline_option {
     size_t most_scratch_bytes; /* bound on the files of large arrays; 0: the free disk is */
-    struct pdf_helper pdf;
+    struct program_helpers helper;
     bool pictures; /* all stages but the last are loaded, and pictures are made in place of the report; STATUS_NOT_FOUND
                       where a stage has no output */
 };

@@ -174,8 +174,11 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
                                            {"version", no_argument, NULL, 'v'},
                                            {"catalogue", no_argument, NULL, 'c'},
                                            {NULL, 0, NULL, 0}};
-    *a = (struct arguments){
-        .n_rank = 1, .team.fd = -1, .memory_mib = 2048, .sandbox = CONFINE_AUTO, .confinement.pdf.order_fd = -1};
+    *a = (struct arguments){.n_rank = 1,
+                            .team.fd = -1,
+                            .memory_mib = 2048,
+                            .sandbox = CONFINE_AUTO,
+                            .confinement.helper = program_helpers_none()};
     for (int c; (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
         if (c == 'h') return fputs(usage, stdout) < 0;
         if (c == 'c') return print_catalogue();
@@ -219,7 +222,7 @@ static status run_stages(struct stage_tools *tools, const struct arguments *a, s
     struct speed_book book = {.n = 0};
     struct job_plan plan;
     const struct pipeline_option option = {
-        .most_scratch_bytes = a->scratch_mib << 20, .pdf = a->confinement.pdf, .pictures = a->pictures};
+        .most_scratch_bytes = a->scratch_mib << 20, .helper = a->confinement.helper, .pictures = a->pictures};
     if (a->speeds != NULL) speed_book_read(a->speeds, &book);
     status s = job_inputs_read(tools, in, err);
     job_plan_init(&plan, tools, in);

@@ -1,4 +1,5 @@
 /* Rows of the option table: the fit. Sections whose keys are names of model parameters are read by job_check_fit. */
+#include "optimizer/job/document/job_exports.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_fit_option.h"
 #include "optimizer/job/document/job_results.h"
@@ -28,15 +29,6 @@ static const char *const gain[] = {
 #define FEWER_ITERATIONS                                                                                               \
     "{\"if\": {\"properties\": {\"starts\": {\"minimum\": 2}}, \"required\": [\"starts\"]}, "                          \
     "\"then\": {\"properties\": {\"max_iterations\": {\"maximum\": 500}}}}"
-
-/* Where results.exported has the wish for each export: its place in the table. */
-enum {
-#define EXPORT(name, ...) EXPORT_##name,
-#include "generated/exports.def"
-#undef EXPORT
-    N_EXPORT
-};
-_Static_assert((int)N_EXPORT <= (int)JOB_MAX_EXPORT, "more exports than JOB_MAX_EXPORT");
 
 const struct job_option option_rows_fit[] = {
     {.path = "fit",

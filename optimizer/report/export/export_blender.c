@@ -2,12 +2,14 @@
  * with radii from no file that all its builds know (Debian's has neither USD nor Alembic):
  *
  *     blender --python cloth.py          or: blender -b --python cloth.py -- picture.exr SAMPLES PX ROW
+ *                                    or: blender -b --python cloth.py -- --save cloth.blend
  *
  * fibers-<group>.txt has the vertices of each fiber with its radius, scene.json the data for the script, which makes
  * hair curves with two Principled Hair BSDFs mixed (hair_on_cloth.h; Cycles), instances, black sheet, camera and lamp.
  * Millimetres. */
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/json_number.h"
+#include "optimizer/report/export/blend_file.h"
 #include "optimizer/report/export/export_scene.h"
 
 #include <math.h>
@@ -19,7 +21,8 @@ static const double mm = 1e3;
 
 static const char script_head[] =
     "\"\"\"Made by Selvedge: builds the cloth of scene.json in Blender 3.4 or later.\n\n"
-    "blender --python cloth.py, or blender -b --python cloth.py -- picture.exr SAMPLES PX ROW\n"
+    "blender --python cloth.py, or blender -b --python cloth.py -- picture.exr SAMPLES PX ROW,\n"
+    "or blender -b --python cloth.py -- --save cloth.blend\n"
     "ROW: of rows.csv, from 0; the first one where it is left out.\"\"\"\n"
     "import csv\nimport json\nimport os\nimport sys\n\nimport bpy\nfrom mathutils import Matrix, Vector\n\n"
     "HERE = os.path.dirname(os.path.abspath(__file__))\n\n\n"
@@ -119,6 +122,8 @@ static const char script_scene[] =
     "        for key in ('lamp', 'camera'):\n"
     "            scene[key]['at'] = [float(row[f'{key}_{x}_mm']) for x in 'xyz']\n"
     "        scene['camera']['up'] = [float(row[f'up_{x}']) for x in 'xyz']\n"
+    "    if more[:1] == ['--save']:\n        build(scene)\n"
+    "        bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath(more[1]), compress=True)\n        return\n"
     "    build(scene)\n    if more:\n"
     "        render = bpy.context.scene.render\n        render.filepath = os.path.abspath(more[0])\n"
     "        bpy.context.scene.cycles.samples = int(more[1]) if len(more) > 1 else 64\n"
@@ -207,6 +212,7 @@ static status write_blender(struct export_scene *e, json_t **materials, struct e
     if (s == STATUS_OK) s = export_rows_write(e, err);
     if (s == STATUS_OK) s = write_script(e, err);
     if (s == STATUS_OK) s = write_scene(e, err);
+    if (s == STATUS_OK) s = blend_file_write(e->report, err);
     if (s == STATUS_OK) *materials = export_hair_json(e);
     return s;
 }

@@ -6,7 +6,7 @@
 #include "optimizer/fit/baseline/plain_brdf.h"
 #include "optimizer/fit/linear/next_photograph.h"
 #include "optimizer/job/document/job_sections.h"
-#include "optimizer/report/findings/pdf_helper.h"
+#include "optimizer/report/findings/program_helper.h"
 #include "optimizer/report/findings/verdict.h"
 #include "optimizer/stages/fit_stages.h"
 #include "optimizer/stages/geometry_stages.h"
@@ -34,7 +34,7 @@ struct report_input {
     const struct fitted_radius *radius;
     const struct validation *validation;
     struct made_cloth *made; /* made anew at the numbers of each model */
-    struct pdf_helper pdf;
+    struct program_helpers helper;
     size_t n_input_warning;     /* warnings of reading the job and of its geometry */
     const double *stage_wall_s; /* by index of the stage table; of this attempt, NaN for a stage of an earlier one */
     const double *work_s;       /* the expected seconds of each part of this stage (optimizer/report/report_work.h) */

@@ -5,7 +5,7 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/stages/reading/pipeline_profile_prior.h"
 #include "optimizer/stages/scene/pipeline_adopt.h"
-#include "optimizer/worker/sandbox/pdf_process.h"
+#include "optimizer/worker/sandbox/program_process.h"
 #include "optimizer/worker/sandbox/sandbox_calls.h"
 #include "optimizer/worker/sandbox/sandbox_files.h"
 
@@ -110,7 +110,7 @@ static bool read_outline(const char *path, struct job_outline *outline)
 
 static void prepare(const struct worker_folder *folder, const struct job_outline *outline, struct confinement *c)
 {
-    if (outline->export_pdf) pdf_process_start(folder, &c->pdf);
+    program_processes_start(folder, outline, &c->helper);
     pipeline_link_geometry(folder, outline->geometry_job);
     pipeline_copy_profile(folder, outline->profile_job);
 }
@@ -151,7 +151,7 @@ static void list_files(const struct confine_files *files, const char *program, s
         permit(list, SANDBOX_READ, files->speeds); /* a plan changes nothing */
     if (!files->no_links && by_hand(&folder))
         permit_links(&outline, files->document != NULL ? files->folder : input, list);
-    if (files->document == NULL) c->pdf.order_fd = -1;
+    if (files->document == NULL) c->helper = program_helpers_none();
     if (files->document == NULL && read) prepare(&folder, &outline, c);
     job_outline_release(&outline);
 }
@@ -174,7 +174,9 @@ static status execute_again(const char *program, char **argv, const struct confi
     while (argv[n] != NULL) n++;
     char **again = calloc(n + 3, sizeof *again);
     if (again == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start in the sandbox: out of memory");
-    snprintf(state, sizeof state, "%d,%d,%d", c->files_version, (int)c->pdf.pid, c->pdf.order_fd);
+    const struct program_helper *pdf = &c->helper.pdf, *blend = &c->helper.blend;
+    snprintf(state, sizeof state, "%d,%d,%d,%d,%d", c->files_version, (int)pdf->pid, pdf->order_fd, (int)blend->pid,
+             blend->order_fd);
     again[0] = argv[0];
     again[1] = (char *)(uintptr_t) "--confined";
     again[2] = state;
@@ -188,7 +190,7 @@ status worker_confine(const struct confine_files *files, char **argv, struct err
 {
     char program[WORKER_PATH_BYTES];
     struct path_list list = {0};
-    struct confinement c = {.pdf.order_fd = -1};
+    struct confinement c = {.helper = program_helpers_none()};
     ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
     if (n <= 0) return error_set_errno(err, "cannot find this program");
     program[n] = '\0';
@@ -208,7 +210,7 @@ void worker_prepare(const char *folder_path, struct confinement *c)
     snprintf(folder.path, sizeof folder.path, "%s", folder_path);
     worker_folder_path(&folder, JOB_FILE_DOCUMENT, NULL, document);
     struct job_outline outline;
-    c->pdf.order_fd = -1;
+    c->helper = program_helpers_none();
     if (read_outline(document, &outline)) prepare(&folder, &outline, c);
     job_outline_release(&outline);
 }
@@ -226,11 +228,15 @@ bool confine_mode_parse(const char *text, enum confine_mode *mode)
 
 bool confinement_parse(const char *state, struct confinement *c)
 {
-    int pid;
+    int pid[2];
     *c = (struct confinement){.executed = true};
-    if (sscanf(state, "%d,%d,%d", &c->files_version, &pid, &c->pdf.order_fd) != 3) return false;
-    c->pdf.pid = pid;
-    if (c->pdf.order_fd >= 0) fcntl(c->pdf.order_fd, F_SETFD, FD_CLOEXEC);
+    struct program_helper *pdf = &c->helper.pdf, *blend = &c->helper.blend;
+    if (sscanf(state, "%d,%d,%d,%d,%d", &c->files_version, &pid[0], &pdf->order_fd, &pid[1], &blend->order_fd) != 5)
+        return false;
+    pdf->pid = pid[0];
+    blend->pid = pid[1];
+    if (pdf->order_fd >= 0) fcntl(pdf->order_fd, F_SETFD, FD_CLOEXEC);
+    if (blend->order_fd >= 0) fcntl(blend->order_fd, F_SETFD, FD_CLOEXEC);
     return true;
 }
 

@@ -7,7 +7,7 @@
 #define SELVEDGE_OPTIMIZER_WORKER_CONFINE_H
 
 #include "base/status.h"
-#include "optimizer/report/findings/pdf_helper.h"
+#include "optimizer/report/findings/program_helper.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -30,13 +30,14 @@ struct confinement {
     bool executed; /* this is the program that worker_confine has executed */
     int files_version;
     bool calls;
-    struct pdf_helper pdf;
+    struct program_helpers helper;
 };
 
 /* Reads "off", "auto" or "required". */
 bool confine_mode_parse(const char *text, enum confine_mode *mode);
-/* Does the work that the sandbox forbids later (starts the helper for report.pdf, links an adopted geometry), restricts
- * the files and executes the program with the same arguments and "--confined STATE". Returns only on failure. */
+/* Does the work that the sandbox forbids later (starts the helpers for other programs, links an adopted geometry),
+ * restricts the files and executes the program with the same arguments and "--confined STATE". Returns only on failure.
+ */
 status worker_confine(const struct confine_files *files, char **argv, struct error *err);
 /* Only the preparations, for a worker without a sandbox. */
 void worker_prepare(const char *folder, struct confinement *confinement);

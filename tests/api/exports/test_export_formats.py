@@ -215,8 +215,10 @@ def test_volumes_of_a_scan(tmp_path):
     (folder / "input" / "rows.csv").write_text(TABLE)
     (folder / "job.json").write_text(json.dumps({
         "sample": "scan", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}, "measurements": {"file": "rows.csv"}, "fit": FIT,
-        "export": {"mitsuba": True}}))
-    subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(folder)], check=True)
+        "export": {"mitsuba": True, "blender": True}}))
+    subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(folder)], check=True, env={**os.environ, "PATH": "/nowhere"})
+    (told,) = [w for w in json.loads((folder / "results" / "result.json").read_text())["warnings"] if "cloth.blend" in w]
+    assert "this machine has no Blender: run cloth.py" in told and not (folder / "results" / "export" / "blender" / "cloth.blend").exists()
     made = folder / "results" / "export" / "mitsuba"
     size, n_channel, box, density = read_vol(made / "density.vol")
     assert n_channel == 1 and 0 <= min(density) < 0.05 and 0.5 < max(density) <= 1
@@ -256,7 +258,8 @@ def in_blender(folder, tmp_path, *row):
 
 def test_a_scene_for_blender(results, tmp_path):
     export, folder = conversion_of(results, "blender"), results / "export" / "blender"
-    assert sorted(p.name for p in folder.iterdir()) == ["cloth.py", "conversion.json", "fibers-0.txt", "rows.csv", "scene.json"]
+    made = ["cloth.blend"] if shutil.which("blender") else []
+    assert sorted(p.name for p in folder.iterdir()) == [*made, "cloth.py", "conversion.json", "fibers-0.txt", "rows.csv", "scene.json"]
     scene, n_fiber = json.loads((folder / "scene.json").read_text()), json.loads((results / "result.json").read_text())["geometry"]["n_fiber"]
     compile((folder / "cloth.py").read_text(), "cloth.py", "exec")
     if shutil.which("blender") is None:
@@ -270,6 +273,10 @@ def test_a_scene_for_blender(results, tmp_path):
     for mine, hair_material in zip(found["hair"], material["hair"]):
         for key, name in (("absorption", "absorption"), ("roughness", "longitudinal_roughness"), ("radial", "azimuthal_roughness"), ("index", "index")):
             assert mine[key] == pytest.approx(hair_material[name], rel=1e-5)
+    opened = subprocess.run(["blender", "-b", folder / "cloth.blend", "--python-expr",
+                             "import bpy; print('curves', sum(o.type == 'CURVES' for o in bpy.data.objects), bpy.context.scene.camera.name)"],
+                            capture_output=True, text=True, check=True, env={**os.environ, "HOME": str(tmp_path)})
+    assert f"curves {len(scene['repeats'])} camera\n" in opened.stdout
     rows = list(csv.DictReader((folder / "rows.csv").open()))
     other = in_blender(folder, tmp_path, 2)
     for look, row in ((found, rows[0]), (other, rows[2])):

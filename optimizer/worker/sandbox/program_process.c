@@ -1,7 +1,10 @@
-#include "optimizer/worker/sandbox/pdf_process.h"
+#include "optimizer/worker/sandbox/program_process.h"
 #include "base/files/durable.h"
+#include "base/process.h"
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/job/job_outline.h"
+#include "optimizer/report/export/blend_file.h"
 #include "optimizer/report/report_pdf.h"
 #include "optimizer/worker/sandbox/sandbox_calls.h"
 #include "optimizer/worker/sandbox/sandbox_files.h"
@@ -9,6 +12,7 @@
 #include <fcntl.h>
 #include <limits.h>
 #include <signal.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,8 +29,8 @@ static void python_settings(char path[WORKER_PATH_BYTES])
     snprintf(path, WORKER_PATH_BYTES, "/etc%.100s", name);
 }
 
-/* WeasyPrint sees its own files, fonts and the page; it writes the PDF, and has no network. Where the kernel lacks a
- * part of the sandbox it does without, as the worker does. */
+/* The program sees its own files, fonts and the job's results, where it writes its file, and has no network. Where the
+ * kernel lacks a part of the sandbox it does without, as the worker does. */
 static void restrict_helper(const char *prefix, const char *results, const char *work)
 {
     int version;
@@ -55,43 +59,82 @@ static void restrict_helper(const char *prefix, const char *results, const char 
     sandbox_calls_of_program(&calls, NULL);
 }
 
-static _Noreturn void be_helper(const struct worker_folder *folder, const char *prefix, int order_fd)
+/* Python, which both programs contain, looks for its files beside the first Python of PATH. */
+static void set_environment(const char *program, const char *work)
+{
+    char folder[PATH_MAX], path[PATH_MAX + 20];
+    if (program_find(program, folder, sizeof folder)) {
+        snprintf(path, sizeof path, "%s:/usr/bin:/bin", folder);
+        setenv("PATH", path, 1);
+    }
+    setenv("TMPDIR", work, 1);
+    setenv("HOME", work, 1);
+}
+
+static _Noreturn void be_helper(const struct worker_folder *folder, const char *prefix, const char *const *command,
+                                int order_fd)
 {
     char results[WORKER_PATH_BYTES], work[WORKER_PATH_BYTES], go;
-    struct pdf_paths path;
     int nothing = open("/dev/null", O_RDWR | O_CLOEXEC);
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (nothing < 0 || dup2(nothing, 0) < 0 || dup2(nothing, 1) < 0 || dup2(nothing, 2) < 0) _exit(EXIT_NO_PROGRAM);
     if (dup2(order_fd, ORDER_FD) < 0 || close_range(ORDER_FD + 1, ~0U, 0) != 0) _exit(EXIT_NO_PROGRAM);
-    report_pdf_paths(folder, &path);
     worker_folder_path(folder, JOB_FOLDER_RESULTS, NULL, results);
     worker_folder_path(folder, JOB_FOLDER_WORK, NULL, work);
     restrict_helper(prefix, results, work);
     if (read(ORDER_FD, &go, 1) != 1) _exit(0); /* the worker has ended */
     close(ORDER_FD);
-    setenv("TMPDIR", work, 1);
-    execlp(JOB_PDF_PROGRAM, JOB_PDF_PROGRAM, "--quiet", path.from, path.part, (char *)NULL);
+    set_environment(command[0], work);
+    execvp(command[0], (char **)(uintptr_t)command);
     _exit(EXIT_NO_PROGRAM);
 }
 
-void pdf_process_start(const struct worker_folder *folder, struct pdf_helper *helper)
+static void start(const struct worker_folder *folder, const char *prefix, const char *const *command,
+                  struct program_helper *helper)
 {
-    char prefix[WORKER_PATH_BYTES];
     int end[2];
-    *helper = (struct pdf_helper){.order_fd = -1};
-    /* folders that do not exist yet cannot be permitted to the helper */
-    for (size_t i = 0; i < 2; i++) {
-        char own[WORKER_PATH_BYTES];
-        worker_folder_path(folder, i == 0 ? JOB_FOLDER_RESULTS : JOB_FOLDER_WORK, NULL, own);
-        durable_make_folder(own, NULL);
-    }
-    if (!report_pdf_installed(prefix) || pipe2(end, O_CLOEXEC) != 0) return;
+    if (pipe2(end, O_CLOEXEC) != 0) return;
     pid_t pid = fork();
-    if (pid == 0) be_helper(folder, prefix, end[0]);
+    if (pid == 0) be_helper(folder, prefix, command, end[0]);
     close(end[0]);
     if (pid < 0 || fcntl(end[1], F_SETFD, 0) != 0) {
         close(end[1]);
         return;
     }
-    *helper = (struct pdf_helper){.pid = pid, .order_fd = end[1]};
+    *helper = (struct program_helper){.pid = pid, .order_fd = end[1]};
+}
+
+void program_processes_start(const struct worker_folder *folder, const struct job_outline *outline,
+                             struct program_helpers *helper)
+{
+    char prefix[WORKER_PATH_BYTES];
+    *helper = program_helpers_none();
+    /* folders that do not exist yet cannot be permitted to a helper */
+    for (size_t i = 0; i < 2 && (outline->export_pdf || outline->export_blend); i++) {
+        char own[WORKER_PATH_BYTES];
+        worker_folder_path(folder, i == 0 ? JOB_FOLDER_RESULTS : JOB_FOLDER_WORK, NULL, own);
+        durable_make_folder(own, NULL);
+    }
+    if (outline->export_pdf && report_pdf_installed(prefix)) {
+        struct pdf_paths path;
+        report_pdf_paths(folder, &path);
+        const char *const command[] = {JOB_PDF_PROGRAM, "--quiet", path.from, path.part, NULL};
+        start(folder, prefix, command, &helper->pdf);
+    }
+    if (outline->export_blend && blend_file_possible(prefix)) {
+        struct blend_paths path;
+        blend_file_paths(folder, &path);
+        const char *const command[] = {JOB_BLEND_PROGRAM,
+                                       "-b",
+                                       "--factory-startup",
+                                       "--python-exit-code",
+                                       "1",
+                                       "--python",
+                                       path.script,
+                                       "--",
+                                       "--save",
+                                       path.part,
+                                       NULL};
+        start(folder, prefix, command, &helper->blend);
+    }
 }
