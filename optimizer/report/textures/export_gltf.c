@@ -84,14 +84,15 @@ static status write_files(const struct gltf *f, struct error *err)
 static json_t *materials_json(const struct gltf *f)
 {
     const struct gltf_surface *g = &f->surface;
-    return json_pack("[{s:n, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}]", "group", "f0",
-                     json_number(g->f0), "f90", json_number(g->f90), "roughness", json_number(g->roughness),
-                     "anisotropy", json_number(g->anisotropy), "base_color", json_number_list(g->base, 3, 1.0),
-                     "sheen_color", json_number_list(g->sheen, 3, 1.0), "sheen_roughness",
-                     json_number(g->sheen_roughness), "transmission", json_number_list(g->means.transmission, 3, 1.0),
-                     "pixel_rel_se", json_number(f->tile.noise), "normal_scale", json_number(g->normal_scale),
-                     "rel_rms", json_number(g->error.rel_rms), "heldout_rel_rms",
-                     json_number(g->error.heldout_rel_rms));
+    return json_pack(
+        "[{s:n, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}]", "group", "f0",
+        json_number_list(g->f0, 3, 1.0), "f90", json_number(g->f90), "roughness", json_number(g->roughness),
+        "anisotropy", json_number(g->anisotropy), "anisotropy_rotation", json_number(g->rotation_rad), "base_color",
+        json_number_list(g->base, 3, 1.0), "sheen_color", json_number_list(g->sheen, 3, 1.0), "sheen_roughness",
+        json_number(g->sheen_roughness), "coat", json_number(g->coat), "coat_roughness", json_number(g->coat_roughness),
+        "transmission", json_number_list(g->means.transmission, 3, 1.0), "pixel_rel_se", json_number(f->tile.noise),
+        "normal_scale", json_number(g->normal_scale), "afar_rel_rms", json_number(g->error.afar_rel_rms), "rel_rms",
+        json_number(g->error.rel_rms), "heldout_rel_rms", json_number(g->error.heldout_rel_rms));
 }
 
 /* The scene owns the errors of rows then. */

@@ -11,20 +11,13 @@ static const double most_through = 0.98;
 
 /* Maps of both materials; base color of the first and of the second, and what the second lets through: its color, and
  * its share as a fourth channel. */
-enum map { NORMAL, ROUGHNESS, ANISOTROPY, BASE, BASE_BELOW, THROUGH, N_MAP };
-static const char *const map_name[N_MAP] = {"normal",     "metallic_roughness", "anisotropy",
-                                            "base_color", "base_color_of_two",  "transmission"};
+enum map { NORMAL, ROUGHNESS, BASE, BASE_BELOW, THROUGH, N_MAP };
+static const char *const map_name[N_MAP] = {"normal", "metallic_roughness", "base_color", "base_color_of_two",
+                                            "transmission"};
 
 static uint8_t byte_of(double share) { return (uint8_t)lround(255.0 * fmin(fmax(share, 0.0), 1.0)); }
 
 static uint8_t signed_byte(double x) { return byte_of(0.5 * (x + 1.0)); }
-
-/* Across the fibers. Of both signs the one is taken that keeps weft and warp away from the step. */
-static double across_rad(const struct texture_tile *t, size_t i)
-{
-    const double across = (double)t->maps.direction_rad[i] + M_PI_2;
-    return across >= 1.25 * M_PI ? across - M_PI : across;
-}
 
 /* Share of the light below the microfacets that goes through at pixel i. */
 static double share_through(const struct texture_tile *t, size_t i)
@@ -38,14 +31,12 @@ static double share_through(const struct texture_tile *t, size_t i)
 static uint8_t value_of(const struct gltf_surface *g, const struct texture_tile *t, enum map map, size_t i, size_t c)
 {
     const double base = (double)t->reflected.pixel[3 * i + c % 3] / fmax(g->means.albedo[c % 3], 1e-9) * g->base[c % 3],
-                 through = share_through(t, i), across = across_rad(t, i);
+                 through = share_through(t, i);
     switch (map) {
     case NORMAL:
         return signed_byte((double)t->maps.normal[3 * i + c]);
     case ROUGHNESS:
         return byte_of(c == 1 ? gltf_surface_roughness(g, i) : c == 0 ? 1.0 : 0.0);
-    case ANISOTROPY:
-        return c == 2 ? byte_of((double)t->maps.coherence[i]) : signed_byte(c == 0 ? cos(across) : sin(across));
     case BASE:
         return image_srgb_byte(base);
     case BASE_BELOW:
@@ -60,13 +51,13 @@ static json_t *texture(json_int_t index) { return json_pack("{s:I, s:i}", "index
 
 static json_t *extensions_of(const struct gltf_surface *g, const json_int_t map[N_MAP], bool lets_through)
 {
-    const double f0 = g->f90 > 0.0 ? g->f0 / (g->f90 * straight) : 0.0;
     json_t *e =
-        json_pack("{s:{s:f}, s:{s:f, s:[f, f, f]}, s:{s:f, s:f, s:o}, s:{s:o, s:f}}", "KHR_materials_ior", "ior",
-                  index_of_refraction, "KHR_materials_specular", "specularFactor", g->f90, "specularColorFactor", f0,
-                  f0, f0, "KHR_materials_anisotropy", "anisotropyStrength", g->anisotropy, "anisotropyRotation", 0.0,
-                  "anisotropyTexture", texture(map[ANISOTROPY]), "KHR_materials_sheen", "sheenColorFactor",
-                  json_number_list(g->sheen, 3, 1.0), "sheenRoughnessFactor", g->sheen_roughness);
+        json_pack("{s:{s:f}, s:{s:f, s:o}, s:{s:f, s:f}, s:{s:o, s:f}, s:{s:f, s:f}}", "KHR_materials_ior", "ior",
+                  index_of_refraction, "KHR_materials_specular", "specularFactor", g->f90, "specularColorFactor",
+                  json_number_list(g->f0, 3, 1.0 / (g->f90 * straight)), "KHR_materials_anisotropy",
+                  "anisotropyStrength", g->anisotropy, "anisotropyRotation", g->rotation_rad, "KHR_materials_sheen",
+                  "sheenColorFactor", json_number_list(g->sheen, 3, 1.0), "sheenRoughnessFactor", g->sheen_roughness,
+                  "KHR_materials_clearcoat", "clearcoatFactor", g->coat, "clearcoatRoughnessFactor", g->coat_roughness);
     if (lets_through)
         json_object_set_new(e, "KHR_materials_diffuse_transmission",
                             json_pack("{s:f, s:o, s:[f, f, f], s:o}", "diffuseTransmissionFactor", 1.0,
@@ -115,8 +106,9 @@ json_t *gltf_material_variants(void)
 
 json_t *gltf_material_extensions(void)
 {
-    return json_pack("[s, s, s, s, s, s]", "KHR_materials_ior", "KHR_materials_specular", "KHR_materials_anisotropy",
-                     "KHR_materials_sheen", "KHR_materials_diffuse_transmission", "KHR_materials_variants");
+    return json_pack("[s, s, s, s, s, s, s]", "KHR_materials_clearcoat", "KHR_materials_ior", "KHR_materials_specular",
+                     "KHR_materials_anisotropy", "KHR_materials_sheen", "KHR_materials_diffuse_transmission",
+                     "KHR_materials_variants");
 }
 
 json_t *gltf_material_mappings(void)

@@ -1,18 +1,33 @@
 #include "optimizer/report/textures/gltf_surface.h"
 
 #include <math.h>
+#include <string.h>
 
-enum { N_THETA = 16, N_PHI = 16, N_START = 4 };
-enum { F0, F90, ROUGHNESS, ANISOTROPY, BRIGHTNESS, GREY, SHEEN, SHEEN_ROUGHNESS, SHEEN_TINT, NORMAL_SCALE, N_UNKNOWN };
+enum { N_THETA = 16, N_PHI = 16, N_START = 2 };
+/* F0, BASE and SHEEN for three channels: F0 as shares of F90, BASE relative to the albedo. ANISOTROPY: square of its
+ * strength, on which the width of the lobe depends; below 0 the lobe is wide along most fibers. */
+enum {
+    F0,
+    F90 = F0 + 3,
+    ROUGHNESS,
+    ANISOTROPY,
+    BASE,
+    SHEEN = BASE + 3,
+    SHEEN_ROUGHNESS = SHEEN + 3,
+    COAT,
+    COAT_ROUGHNESS,
+    NORMAL_SCALE,
+    N_UNKNOWN
+};
 /* Below this roughness viewers show no highlight of a lamp without size. */
 static const double least_roughness = 0.05, least_cosine = 1e-3;
-/* BRIGHTNESS of the base relative to the albedo, from which the share GREY of its grey is taken for the highlight. */
-static const double lower[N_UNKNOWN] = {0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.3},
-                    upper[N_UNKNOWN] = {0.9, 1.0, 1.0, 1.0, 2.5, 1.0, 1.0, 1.0, 1.0, 2.5};
-static const double start[N_START][TEXTURE_MAX_UNKNOWN] = {{0.04, 0.5, 0.6, 0.2, 0.9, 0.3, 0.1, 0.5, 0.5, 1.0},
-                                                           {0.2, 0.9, 0.4, 0.5, 0.7, 0.5, 0.05, 0.3, 0.2, 1.0},
-                                                           {0.01, 0.1, 0.9, 0.1, 0.9, 0.1, 0.3, 0.8, 0.8, 1.0},
-                                                           {0.05, 0.3, 0.5, 0.7, 0.6, 0.2, 0.3, 0.4, 0.8, 1.5}};
+static const double coat_straight = 0.04; /* share of light from straight that a clear coat of glTF reflects */
+static const double lower[N_UNKNOWN] = {0.0, 0.0, 0.0, 1e-3, 0.2, -1.0, 0.0, 0.0,
+                                        0.0, 0.0, 0.0, 0.0,  0.1, 0.0,  0.1, 0.3},
+                    upper[N_UNKNOWN] = {0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 1.5, 1.5, 1.5, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.5};
+static const double start[N_START][TEXTURE_MAX_UNKNOWN] = {
+    {0.07, 0.07, 0.07, 0.9, 0.42, 0.63, 0.25, 0.25, 0.25, 0.05, 0.05, 0.05, 0.5, 0.02, 0.5, 1.0},
+    {0.02, 0.02, 0.02, 0.2, 0.9, -0.2, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1, 0.7, 0.6, 0.5, 1.0}};
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -70,24 +85,39 @@ static double albedo_at(const struct gltf_surface *g, double cosine)
 
 /* ---- microfacets ---- */
 
-/* Density of the half vector times the visibility. The frame is the mesh's, with the normal of the map. */
-static double microfacets(const struct gltf_surface *g, const struct texture_sample *s, const double w[3][3],
-                          const double cosine[3])
+/* Density of the half vector times the visibility, for the widths at and ab of the lobe and parts along and beside the
+ * direction of at, of the directions to lamp and camera and of the half vector. cosine: with the normal. */
+static double lobe_of(double at, double ab, const double along[3], const double beside[3], const double cosine[3])
 {
-    const double *n = s->normal, *t = s->tangent, strength = fmin(g->anisotropy * s->coherence, 1.0);
-    const double roughness = rough(g, s->root_spread), ab = roughness * roughness,
-                 at = ab + (1.0 - ab) * strength * strength;
-    /* the direction in the plane of the cloth whose part along the surface is the sample's tangent */
-    const double x = t[0] * n[2] - n[0] * t[2], y = t[1] * n[2] - n[1] * t[2], inverse = 1.0 / hypot(x, y);
-    double along[3], beside[3];
-    for (int k = 0; k < 3; k++) {
-        along[k] = inverse * (x * w[k][0] + y * w[k][1]);
-        beside[k] = inverse * (x * w[k][1] - y * w[k][0]);
-    }
     const double q = pow(along[2] / at, 2.0) + pow(beside[2] / ab, 2.0) + cosine[2] * cosine[2];
     const double masked = cosine[0] * sqrt(pow(at * along[1], 2.0) + pow(ab * beside[1], 2.0) + cosine[1] * cosine[1]) +
                           cosine[1] * sqrt(pow(at * along[0], 2.0) + pow(ab * beside[0], 2.0) + cosine[0] * cosine[0]);
     return 0.5 / (M_PI * at * ab * q * q * masked);
+}
+
+/* A lobe with anisotropy has the frame of the mesh, turned, where only the normal is that of the map; one without has
+ * the frame of the map. */
+static double microfacets(const struct gltf_surface *g, const struct texture_sample *s, const double w[3][3],
+                          const double cosine[3])
+{
+    const double roughness = rough(g, s->root_spread), ab = roughness * roughness,
+                 at = ab + (1.0 - ab) * g->anisotropy * g->anisotropy;
+    const double x = cos(g->rotation_rad), y = sin(g->rotation_rad);
+    double along[3], beside[3];
+    for (int k = 0; k < 3; k++) {
+        along[k] = g->anisotropy > 0.0 ? x * w[k][0] + y * w[k][1] : dot(w[k], s->tangent);
+        beside[k] = g->anisotropy > 0.0 ? x * w[k][1] - y * w[k][0] : dot(w[k], s->bitangent);
+    }
+    return lobe_of(at, ab, along, beside, cosine);
+}
+
+/* The coat alone, on the plane of the cloth. half: cosine between the half vector and a direction. */
+static double coat_of(const struct gltf_surface *g, const double w[3][3], double half)
+{
+    const double alpha = g->coat_roughness * g->coat_roughness, a2 = alpha * alpha, i = w[0][2], o = w[1][2];
+    const double fresnel = coat_straight + (1.0 - coat_straight) * pow(1.0 - half, 5.0);
+    const double masked = i * sqrt(a2 + (1.0 - a2) * o * o) + o * sqrt(a2 + (1.0 - a2) * i * i);
+    return fresnel * a2 / (M_PI * pow(w[2][2] * w[2][2] * (a2 - 1.0) + 1.0, 2.0)) * 0.5 / fmax(masked, 1e-9);
 }
 
 void gltf_surface_reflect(const void *surface, const struct texture_sample *s, const double wi[3], const double wo[3],
@@ -97,18 +127,19 @@ void gltf_surface_reflect(const void *surface, const struct texture_sample *s, c
     const double sum[3] = {wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]}, length = fmax(sqrt(dot(sum, sum)), 1e-9);
     const double w[3][3] = {
         {wi[0], wi[1], wi[2]}, {wo[0], wo[1], wo[2]}, {sum[0] / length, sum[1] / length, sum[2] / length}};
-    rgb[0] = rgb[1] = rgb[2] = 0.0;
-    const double cosine[3] = {dot(wi, s->normal), fmax(dot(wo, s->normal), least_cosine),
+    const double cosine[3] = {fmax(dot(wi, s->normal), 0.0), fmax(dot(wo, s->normal), least_cosine),
                               fmin(fmax(dot(w[2], s->normal), 0.0), 1.0)};
-    if (cosine[0] <= 0.0) return;
-    const double half = fmin(fmax(dot(wo, w[2]), 0.0), 1.0);
-    const double fresnel = g->f0 + (g->f90 - g->f0) * pow(1.0 - half, 5.0);
-    const double shine = fresnel * microfacets(g, s, w, cosine);
-    const double sheen = sheen_of(g->sheen_roughness, cosine[2], cosine[0], cosine[1]);
+    const double half = fmin(fmax(dot(wo, w[2]), 0.0), 1.0), grazing = pow(1.0 - half, 5.0);
+    const double coat = M_PI * g->coat * coat_of(g, w, half) * wi[2],
+                 uncoated = 1.0 - g->coat * (coat_straight + (1.0 - coat_straight) * pow(1.0 - wo[2], 5.0));
+    const double lobe = cosine[0] > 0.0 ? microfacets(g, s, w, cosine) : 0.0;
+    const double sheen = cosine[0] > 0.0 ? sheen_of(g->sheen_roughness, cosine[2], cosine[0], cosine[1]) : 0.0;
     const double below = 1.0 - largest(g->sheen) * fmax(albedo_at(g, cosine[0]), albedo_at(g, cosine[1]));
-    for (int c = 0; c < 3; c++)
-        rgb[c] = cosine[0] *
-                 (below * (g->base[c] * s->share[c] * (1.0 - fresnel) + M_PI * shine) + M_PI * g->sheen[c] * sheen);
+    for (int c = 0; c < 3; c++) {
+        const double fresnel = g->f0[c] + (g->f90 - g->f0[c]) * grazing, base = g->base[c] * s->share[c];
+        rgb[c] = below * (base * (1.0 - fresnel) + M_PI * fresnel * lobe) + M_PI * g->sheen[c] * sheen;
+        rgb[c] = coat + uncoated * cosine[0] * rgb[c];
+    }
 }
 
 /* ---- fit ---- */
@@ -116,30 +147,57 @@ void gltf_surface_reflect(const void *surface, const struct texture_sample *s, c
 static void take(void *surface, const double *x)
 {
     struct gltf_surface *g = surface;
-    const double *albedo = g->means.albedo, grey = fmin(fmin(albedo[0], albedo[1]), albedo[2]),
-                 bright = fmax(largest(albedo), 1e-6);
     g->f90 = x[F90];
-    g->f0 = fmin(x[F0], x[F90]); /* an extension has the factor f90 for both */
     g->roughness = x[ROUGHNESS];
-    g->anisotropy = x[ANISOTROPY];
+    g->anisotropy = sqrt(fabs(x[ANISOTROPY]));
+    g->rotation_rad = g->across_rad + (x[ANISOTROPY] < 0.0 ? M_PI_2 : 0.0);
     for (int c = 0; c < 3; c++) {
-        g->base[c] = fmin(x[BRIGHTNESS] * (albedo[c] - x[GREY] * grey), 1.0);
-        g->sheen[c] = x[SHEEN] * (1.0 - x[SHEEN_TINT] * (1.0 - albedo[c] / bright));
+        g->f0[c] = x[F0 + c] * x[F90]; /* an extension has the factor f90 for both */
+        g->base[c] = fmin(x[BASE + c] * g->means.albedo[c], 1.0);
+        g->sheen[c] = x[SHEEN + c];
     }
+    g->coat = x[COAT];
+    g->coat_roughness = x[COAT_ROUGHNESS];
     g->normal_scale = x[NORMAL_SCALE];
     gltf_surface_set_sheen(g, x[SHEEN_ROUGHNESS]);
 }
 
 static void look(void *surface, const double wo[3]) { (void)surface, (void)wo; }
 
+/* Direction across most fibers, as they are seen. */
+static double most_across(const struct texture_maps *m)
+{
+    double twice[2] = {0.0, 0.0};
+    for (size_t i = 0; i < m->width * m->height; i++) {
+        twice[0] -= (double)m->coherence[i] * cos(2.0 * (double)m->direction_rad[i]);
+        twice[1] -= (double)m->coherence[i] * sin(2.0 * (double)m->direction_rad[i]);
+    }
+    return 0.5 * atan2(twice[1], twice[0]);
+}
+
 static double normal_scale(const void *surface) { return ((const struct gltf_surface *)surface)->normal_scale; }
+
+static double sum_of(const struct texture_error *e) { return e->row_rel_rms + e->afar_rel_rms + e->hemisphere_rel_rms; }
 
 status gltf_surface_fit(struct gltf_surface *g, struct texture_maps *maps, const struct texture_target *target,
                         struct error *err)
 {
-    const struct texture_model model = {N_UNKNOWN,   N_START, lower, upper, start, take, look, gltf_surface_reflect,
-                                        normal_scale};
+    double least[N_UNKNOWN], most[N_UNKNOWN];
+    const struct texture_model model = {N_UNKNOWN,    N_START, least, most, start, take, look, gltf_surface_reflect,
+                                        normal_scale, true};
+    memcpy(least, lower, sizeof least);
+    memcpy(most, upper, sizeof most);
+    g->across_rad = most_across(maps);
+    struct gltf_surface round = *g;
     status s = texture_fit_run(&model, g, maps, &g->means, target, &g->error, err);
+    least[ANISOTROPY] = most[ANISOTROPY] = 0.0;
+    if (s == STATUS_OK) s = texture_fit_run(&model, &round, maps, &g->means, target, &round.error, err);
+    if (s == STATUS_OK && sum_of(&round.error) < sum_of(&g->error)) {
+        struct texture_error worse = g->error;
+        *g = round;
+        round.error = worse;
+    }
+    texture_error_release(&round.error);
     if (s == STATUS_OK) texture_maps_scale_normals(maps, g->normal_scale);
     return s;
 }

@@ -1,8 +1,11 @@
-/* The surface of a texture set as a glTF 2.0 material has it: a diffuse base under microfacets that are rougher across
- * the fibers, and sheen over both. Khronos 2021, "glTF 2.0 Specification", appendix B, with KHR_materials_specular,
- * KHR_materials_anisotropy and KHR_materials_sheen. Where these leave a choice, viewers by three.js decide: masking of
- * both directions together (Heitz 2014), sheen with the visibility of Ashikhmin and Premoze (2007), and an anisotropy
- * whose frame keeps the tangent of the mesh. */
+/* The surface of a texture set as a glTF 2.0 material has it: a diffuse base under microfacets that are rougher along
+ * one direction, sheen over both, and a clear coat, whose normal is the mesh's. Khronos 2021, "glTF 2.0 Specification",
+ * appendix B, with KHR_materials_specular, KHR_materials_anisotropy, KHR_materials_sheen and KHR_materials_clearcoat.
+ * Where these leave a choice, viewers by three.js decide: masking of both directions together (Heitz 2014), sheen with
+ * the visibility of Ashikhmin and Premoze (2007), and an anisotropy whose frame keeps the tangent of the mesh.
+ *
+ * The direction of the anisotropy is one for all pixels: viewers show the mean of a map from afar, and the mean of the
+ * directions of weft and warp is neither. */
 #ifndef SELVEDGE_OPTIMIZER_GLTF_SURFACE_H
 #define SELVEDGE_OPTIMIZER_GLTF_SURFACE_H
 
@@ -13,10 +16,13 @@ enum { GLTF_N_COSINE = 24 };
 struct gltf_surface {
     const struct texture_maps *maps;
     struct texture_means means;
-    double f0, f90;               /* reflected share of light that comes straight, and of grazing light */
-    double roughness, anisotropy; /* factors of the maps of spread and coherence */
-    double base[3];               /* mean base color */
+    double f0[3], f90;               /* reflected share of light that comes straight, and of grazing light */
+    double roughness;                /* factor of the map of spreads */
+    double anisotropy, rotation_rad; /* strength, and direction of the greater width, from the weft */
+    double across_rad;               /* direction across most fibers */
+    double base[3];                  /* mean base color */
     double sheen[3], sheen_roughness;
+    double coat, coat_roughness;
     double sheen_albedo[GLTF_N_COSINE]; /* of sheen of color 1, by the cosine of a direction in equal steps of [0, 1] */
     double normal_scale;                /* factor on the slopes of the fibers, which the maps have after the fit */
     struct texture_error error;         /* owned */

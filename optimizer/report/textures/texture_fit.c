@@ -14,6 +14,7 @@ struct search {
     const struct texture_target *target;
     size_t n_fitted;                                       /* radiances of the target that have a weight */
     struct texture_sample map[N_SAMPLE], sample[N_SAMPLE]; /* as the maps have them, and with scaled normals */
+    struct texture_sample afar;                            /* with the means of the maps */
 };
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -88,10 +89,29 @@ static void make_samples(const struct texture_maps *m, struct texture_sample *sa
     }
 }
 
-/* Each rotation of a row that is a mean over n of them has its own samples, a part of all. */
-static void add_rotation(const struct search *f, const struct configuration *k, uint32_t r, uint32_t n, double rgb[3])
+/* The means of the maps on a flat surface. Its tangent is that of most fibers. */
+static void make_afar(struct search *f)
 {
-    const size_t step = n < MOST_STEP ? n : MOST_STEP, n_sample = N_SAMPLE / step;
+    double twice[2] = {0.0, 0.0};
+    f->afar = (struct texture_sample){.normal = {0.0, 0.0, 1.0}, .share = {1.0, 1.0, 1.0}};
+    for (size_t k = 0; k < N_SAMPLE; k++) {
+        const struct texture_sample *s = &f->map[k];
+        f->afar.root_spread += s->root_spread / N_SAMPLE;
+        f->afar.coherence += s->coherence / N_SAMPLE;
+        twice[0] += s->tangent[0] * s->tangent[0] - s->tangent[1] * s->tangent[1];
+        twice[1] += 2.0 * s->tangent[0] * s->tangent[1];
+    }
+    const double phi = 0.5 * atan2(twice[1], twice[0]);
+    f->afar.tangent[0] = f->afar.bitangent[1] = cos(phi);
+    f->afar.tangent[1] = sin(phi);
+    f->afar.bitangent[0] = -sin(phi);
+}
+
+/* Each rotation of a row that is a mean over n of them has its own samples, a part of all. */
+static void add_rotation(const struct search *f, const struct configuration *k, uint32_t r, bool afar, double rgb[3])
+{
+    const uint32_t n = k->n_rotation > 1 ? k->n_rotation : 1;
+    const size_t step = n < MOST_STEP ? n : MOST_STEP, n_sample = afar ? 1 : N_SAMPLE / step;
     const double turned = k->cloth_rotation_rad + 2.0 * M_PI * r / n;
     double wi[3], wo[3], one[3];
     polar(k->light_theta_rad, k->light_phi_rad - turned, wi);
@@ -102,16 +122,16 @@ static void add_rotation(const struct search *f, const struct configuration *k, 
     }
     f->model->look(f->surface, wo);
     for (size_t i = 0; i < n_sample; i++) {
-        f->model->reflect(f->surface, &f->sample[step * i + r % step], wi, wo, one);
+        f->model->reflect(f->surface, afar ? &f->afar : &f->sample[step * i + r % step], wi, wo, one);
         for (int c = 0; c < 3; c++) rgb[c] += one[c] / (double)n_sample;
     }
 }
 
-static void radiance_of(const struct search *f, const struct configuration *k, double rgb[3])
+static void radiance_of(const struct search *f, const struct configuration *k, bool afar, double rgb[3])
 {
     const uint32_t n = k->n_rotation > 1 ? k->n_rotation : 1;
     rgb[0] = rgb[1] = rgb[2] = 0.0;
-    for (uint32_t r = 0; r < n && k->light != LIGHT_NO_LAMP; r++) add_rotation(f, k, r, n, rgb);
+    for (uint32_t r = 0; r < n && k->light != LIGHT_NO_LAMP; r++) add_rotation(f, k, r, afar, rgb);
     for (int c = 0; c < 3; c++) rgb[c] = rgb[c] / n + k->environment_rgb[c] * f->means->albedo[c];
 }
 
@@ -131,8 +151,11 @@ static void residuals(void *context, const double *x, double *out)
         const struct texture_radiance *r = &f->target->item[i];
         double rgb[3];
         if (!(r->weight > 0.0)) continue;
-        radiance_of(f, &r->configuration, rgb);
-        for (int c = 0; c < 3; c++) *out++ = (rgb[c] - r->rgb[c]) * r->scale * sqrt(r->weight / 3.0);
+        for (int afar = 0; afar <= f->model->has_afar; afar++) {
+            const double part = r->weight / (f->model->has_afar ? 6.0 : 3.0);
+            radiance_of(f, &r->configuration, afar == 1, rgb);
+            for (int c = 0; c < 3; c++) *out++ = (rgb[c] - r->rgb[c]) * r->scale * sqrt(part);
+        }
     }
 }
 
@@ -150,17 +173,22 @@ static status judge(struct search *f, struct texture_error *error, struct error 
 {
     struct part part[TEXTURE_OTHER_DIRECTION + 1] = {{0.0, 0.0}};
     const struct part none = {0.0, 0.0};
+    double afar = 0.0;
     error->row_rel_error = calloc(f->target->n_row + 1, sizeof *error->row_rel_error);
     if (error->row_rel_error == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot judge textures: out of memory");
     for (size_t i = 0; i < f->target->n; i++) {
         const struct texture_radiance *r = &f->target->item[i];
         double rgb[3], square = 0.0;
-        radiance_of(f, &r->configuration, rgb);
+        radiance_of(f, &r->configuration, false, rgb);
         for (int c = 0; c < 3; c++) square += pow((rgb[c] - r->rgb[c]) * r->scale, 2.0) / 3.0;
         if (i < f->target->n_row) error->row_rel_error[i] = sqrt(square);
+        if (i < f->target->n_row) radiance_of(f, &r->configuration, true, rgb);
+        for (int c = 0; c < 3 && i < f->target->n_row; c++)
+            afar += pow((rgb[c] - r->rgb[c]) * r->scale, 2.0) / (3.0 * (double)f->target->n_row);
         part[r->part].square += square;
         part[r->part].n += 1.0;
     }
+    error->afar_rel_rms = sqrt(afar);
     error->rel_rms = root_of(part[TEXTURE_FITTED_ROW], none);
     error->heldout_rel_rms = root_of(part[TEXTURE_HELDOUT_ROW], none);
     error->row_rel_rms = root_of(part[TEXTURE_FITTED_ROW], part[TEXTURE_HELDOUT_ROW]);
@@ -172,7 +200,7 @@ static status judge(struct search *f, struct texture_error *error, struct error 
 static status search_all(struct search *f, double best[TEXTURE_MAX_UNKNOWN], struct error *err)
 {
     const struct least_squares p = {.n_unknown = f->model->n_unknown,
-                                    .n_residual = 3 * f->n_fitted,
+                                    .n_residual = (f->model->has_afar ? 6 : 3) * f->n_fitted,
                                     .lower = f->model->lower,
                                     .upper = f->model->upper,
                                     .residuals = residuals,
@@ -205,6 +233,7 @@ status texture_fit_run(const struct texture_model *model, void *surface, const s
     f->target = target;
     for (size_t i = 0; i < target->n; i++) f->n_fitted += target->item[i].weight > 0.0;
     make_samples(maps, f->map);
+    make_afar(f);
     status s = search_all(f, best, err);
     if (s == STATUS_OK) {
         take(f, best);

@@ -8,6 +8,8 @@
 #include "optimizer/report/textures/texture_maps.h"
 #include "optimizer/report/textures/texture_target.h"
 
+#include <stdbool.h>
+
 enum { TEXTURE_MAX_UNKNOWN = LEAST_SQUARES_MAX_UNKNOWN };
 
 /* A place between the pixels. tangent: across the fibers, where the surface is rougher; root_spread: square root of
@@ -31,6 +33,7 @@ struct texture_model {
                     double rgb[3]);
     /* Factor on the slopes of the map of normals; NULL: 1. */
     double (*normal_scale)(const void *surface);
+    bool has_afar; /* fitted from afar, too, where programs see the mean of each map: its flat normal */
 };
 
 /* Reflected and transmitted shares of even light, means over the maps. */
@@ -45,6 +48,7 @@ struct texture_error {
     double rel_rms, heldout_rel_rms; /* over the fitted and the held-out rows of the job */
     double row_rel_rms;              /* over both */
     double hemisphere_rel_rms;       /* over directions of the hemisphere that were not fitted */
+    double afar_rel_rms;             /* over all rows, with the means of the maps */
     double *row_rel_error;           /* of each row of the job; owned */
 };
 
