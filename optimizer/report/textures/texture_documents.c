@@ -108,7 +108,8 @@ static void print_numbers(FILE *text, const struct texture_surface *t)
 status texture_materialx_write(const struct export_scene *e, const struct texture_surface *t, struct error *err)
 {
     const struct texture_maps *m = t->maps;
-    const double size_mm[2] = {m->pixel_mm[0] * (double)m->width, m->pixel_mm[1] * (double)m->height};
+    const double size_mm[2] = {m->pixel_mm[0] * (double)(m->repeat[0] * m->width),
+                               m->pixel_mm[1] * (double)(m->repeat[1] * m->height)};
     struct export_text text;
     status s = export_text_open(&text, err);
     if (s != STATUS_OK) return s;
@@ -139,8 +140,9 @@ status texture_materialx_write(const struct export_scene *e, const struct textur
 
 static json_t *image_json(const struct texture_maps *m, const char *file)
 {
-    return json_pack("{s:f, s:f, s:{s:f, s:f}, s:s, s:{s:f, s:s}}", "width", m->pixel_mm[0] * (double)m->width,
-                     "height", m->pixel_mm[1] * (double)m->height, "dpi", "x", mm_per_inch / m->pixel_mm[0], "y",
+    return json_pack("{s:f, s:f, s:{s:f, s:f}, s:s, s:{s:f, s:s}}", "width",
+                     m->pixel_mm[0] * (double)(m->repeat[0] * m->width), "height",
+                     m->pixel_mm[1] * (double)(m->repeat[1] * m->height), "dpi", "x", mm_per_inch / m->pixel_mm[0], "y",
                      mm_per_inch / m->pixel_mm[1], "path", file, "repeat", "rotation", 0.0, "mode", "normal");
 }
 

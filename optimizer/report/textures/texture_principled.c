@@ -17,7 +17,9 @@ enum {
 /* Programs that leave out the rotation of the anisotropy show another surface with it, so it must bring the error down
  * to this part. */
 static const double least_gain = 0.9;
-static const double lower[N_UNKNOWN] = {0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2},
+/* Least part of the reflected light that the base keeps: without it the maps of dark cloths would be black. */
+#define LEAST_BASE 0.1
+static const double lower[N_UNKNOWN] = {0.0, 0.3, 0.0, LEAST_BASE, LEAST_BASE, LEAST_BASE, 0.0, 0.0, 0.2},
                     upper[N_UNKNOWN] = {1.0, 1.0, 1.0, 1.5, 1.5, 1.5, 3.0, 1.0, 2.5};
 static const double start[N_START][TEXTURE_MAX_UNKNOWN] = {{0.5, 0.8, 0.1, 0.7, 0.7, 0.7, 0.8, 0.5, 1.0},
                                                            {0.3, 0.5, 0.3, 0.9, 0.9, 0.9, 0.1, 0.5, 1.0},
