@@ -5,9 +5,11 @@
  * cloth.mtlx and cloth.u3m (texture_documents.h). Of the parameters, texture_surface.h. */
 #include "base/files/durable.h"
 #include "optimizer/job/document/json_number.h"
+#include "optimizer/job/job_folder.h"
 #include "optimizer/report/export/export_scene.h"
 #include "optimizer/report/textures/texture_documents.h"
 #include "optimizer/report/textures/texture_tile.h"
+#include "optimizer/report/textures/u3ma_file.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 
 #include <math.h>
@@ -145,11 +147,55 @@ static status write_map(const struct textures *t, const struct image *all, size_
         float value = all->pixel[i / 3 * N_CHANNEL + first + (n == 3 ? i % 3 : 0)];
         if (first == NORMAL) value = 0.5f * (value + 1.0f);
         if (first == DIRECTION) value = rotation_turns(value);
+        if (first == HEIGHT) value = 1.0f + value / (float)texture_height_range_mm(t->e);
         tile[i] = is_color ? image_srgb_byte((double)value) : byte_of(value);
     }
     status s = write_repeated(t, tile, name, err);
     free(tile);
     return s;
+}
+
+/* The U3M material from straight above, in the light of a lamp on the upper left and in even light. */
+static status write_preview(const struct textures *t, struct error *err)
+{
+    static const double wi[3] = {-0.5, 0.5, M_SQRT1_2}, wo[3] = {0.0, 0.0, 1.0};
+    const struct texture_maps *m = &t->tile.maps;
+    size_t size[2];
+    texture_preview_size(m, size);
+    char path[WORKER_PATH_BYTES], part[WORKER_PATH_BYTES];
+    uint8_t *rgb = malloc(3 * size[0] * size[1]);
+    if (rgb == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write textures: out of memory");
+    for (size_t k = 0; k < size[0] * size[1]; k++) {
+        const size_t i = k / size[0] % m->height * m->width + k % size[0] % m->width;
+        const struct texture_sample s = texture_pixel_sample(m, i, t->principled.normal_scale);
+        double lit[3];
+        texture_principled_reflect(&t->principled, &s, wi, wo, lit);
+        for (size_t c = 0; c < 3; c++)
+            rgb[3 * k + c] = image_srgb_byte(0.7 * lit[c] + 0.3 * (double)t->tile.reflected.pixel[3 * i + c]);
+    }
+    paths_of(t, "preview.png", path, part);
+    status s = publish(t, image_write_png_rgb8(rgb, size[0], size[1], part, err), part, path, err);
+    free(rgb);
+    return s;
+}
+
+/* cloth.u3ma: the U3M material with the pictures that it names. */
+static status write_archive(const struct textures *t, struct error *err)
+{
+    static const char *const name[] = {"cloth.u3m",
+                                       "preview.png",
+                                       "principled_base_color.png",
+                                       "normal.png",
+                                       "principled_roughness.png",
+                                       "principled_anisotropy.png",
+                                       "anisotropy_rotation.png",
+                                       "transmission.png",
+                                       "height.png"};
+    char path[WORKER_PATH_BYTES], part[WORKER_PATH_BYTES], folder[WORKER_PATH_BYTES];
+    worker_folder_path(t->e->report->in.job->tools->folder, JOB_FOLDER_RESULTS, t->e->folder, folder);
+    paths_of(t, "cloth.u3ma", path, part);
+    return publish(t, u3ma_file_write(part, folder, name, sizeof name / sizeof *name, time(NULL), err), part, path,
+                   err);
 }
 
 static status write_maps(const struct textures *t, struct error *err)
@@ -165,7 +211,8 @@ static status write_maps(const struct textures *t, struct error *err)
                {DIRECTION, 1, "anisotropy_rotation.png"},
                {PRINCIPLED_BASE, 3, "principled_base_color.png"},
                {PRINCIPLED_ROUGHNESS, 1, "principled_roughness.png"},
-               {PRINCIPLED_ANISOTROPY, 1, "principled_anisotropy.png"}};
+               {PRINCIPLED_ANISOTROPY, 1, "principled_anisotropy.png"},
+               {HEIGHT, 1, "height.png"}};
     struct image all;
     status s = image_init(&all, t->tile.maps.width, t->tile.maps.height, N_CHANNEL, err);
     if (s != STATUS_OK) return s;
@@ -276,7 +323,9 @@ static status write_textures(struct export_scene *e, json_t **materials, struct 
     if (s == STATUS_OK) s = fit_surfaces(&t, err);
     if (s == STATUS_OK) s = write_maps(&t, err);
     if (s == STATUS_OK) s = texture_materialx_write(e, &t.surface, err);
+    if (s == STATUS_OK) s = write_preview(&t, err);
     if (s == STATUS_OK) s = texture_u3m_write(e, &t.principled, err);
+    if (s == STATUS_OK) s = write_archive(&t, err);
     if (s == STATUS_OK) {
         *materials = material_json(&t);
         state_error(&t);

@@ -77,6 +77,13 @@ static struct texture_sample turned(const struct texture_sample *map, double fac
     return s;
 }
 
+struct texture_sample texture_pixel_sample(const struct texture_maps *maps, size_t i, double normal_scale)
+{
+    struct texture_sample s;
+    sample_at(maps, (double)(i % maps->width) + 0.5, (double)(i / maps->width) + 0.5, &s);
+    return turned(&s, normal_scale);
+}
+
 /* A grid over the tile, each line of it shifted against the one before, so that samples lie anywhere between the
  * pixels. */
 static void make_samples(const struct texture_maps *m, struct texture_sample *sample)

@@ -52,6 +52,9 @@ struct texture_error {
     double *row_rel_error;           /* of each row of the job; owned */
 };
 
+/* The place in the middle of pixel i, with slopes of the normal times normal_scale. */
+struct texture_sample texture_pixel_sample(const struct texture_maps *maps, size_t i, double normal_scale);
+
 /* Leaves the best numbers in the surface, and fills *error. STATUS_NO_MEMORY. */
 status texture_fit_run(const struct texture_model *model, void *surface, const struct texture_maps *maps,
                        const struct texture_means *means, const struct texture_target *target,

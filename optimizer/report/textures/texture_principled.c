@@ -72,8 +72,8 @@ static double highlight(const struct texture_principled *p, const struct texture
     return texture_ggx(s, h, ax, ay) * g * texture_fresnel(dot(wi, h), 0.08 * p->specular) / (4.0 * dot(wo, s->normal));
 }
 
-static void reflect(const void *surface, const struct texture_sample *s, const double wi[3], const double wo[3],
-                    double rgb[3])
+void texture_principled_reflect(const void *surface, const struct texture_sample *s, const double wi[3],
+                                const double wo[3], double rgb[3])
 {
     static const double luminance[3] = {0.2126, 0.7152, 0.0722};
     const struct texture_principled *p = surface;
@@ -97,7 +97,8 @@ static void reflect(const void *surface, const struct texture_sample *s, const d
 status texture_principled_fit(struct texture_principled *p, const struct texture_target *target, struct error *err)
 {
     double most[N_UNKNOWN];
-    struct texture_model model = {N_UNKNOWN, N_START, lower, most, start, take, look, reflect, normal_scale};
+    struct texture_model model = {N_UNKNOWN,   N_START, lower, most, start, take, look, texture_principled_reflect,
+                                  normal_scale};
     struct texture_principled round = *p;
     memcpy(most, upper, sizeof most);
     status s = texture_fit_run(&model, p, p->maps, &p->means, target, &p->error, err);
