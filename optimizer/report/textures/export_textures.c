@@ -283,7 +283,7 @@ static json_t *material_json(const struct textures *t)
     return json_pack("[o]", json);
 }
 
-/* The error of the export is that of its U3M material, whose model is the smaller one. */
+/* States the error of the U3M material, whose model is the smaller one, as the error of the export. */
 static void state_error(struct textures *t)
 {
     struct texture_error *error = &t->principled.error;

@@ -251,7 +251,7 @@ static json_t *front_json(const struct export_scene *e, const struct texture_pri
     return v;
 }
 
-/* A word of U3M's list for a described cloth, which is woven; null for others, of which nothing is known. */
+/* A word of U3M's list for a described cloth, which is woven; null for other cloths, which may be knitted. */
 static json_t *woven_json(const struct export_scene *e)
 {
     const struct job_cloth *cloth = e->report->in.job->cloth;

@@ -41,7 +41,7 @@ struct texture_means {
     double albedo[3], transmission[3];
 };
 
-/* How far the radiances of a surface are from those of the target: differences over the mean of the target's channels,
+/* Distance of the radiances of a surface from the target: differences over the mean of the target's channels,
  * or over 0.02 where that is darker, as errors of fits (optimizer/fit/objective/objective.h). Root mean squares; NaN
  * where there is nothing to compare. */
 struct texture_error {

@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-/* The coat is that of OpenPBR when nothing is said of it. Its index is 1.6, which reflects this share. */
+/* OpenPBR's default coat: an index of 1.6, which reflects this share. */
 static const double coat_ior = 1.6, coat_straight = 0.0532544, least_roughness = 0.05;
 /* Least part of the reflected light that the base keeps: without it the maps of dark cloths would be black. */
 #define LEAST_BASE 0.05

@@ -13,8 +13,8 @@ enum { MOST_TILE_PX = 1024, LEAST_TILE_PX = 2, LEAST_SAMPLE = 8, MOST_SAMPLE = 1
 enum { N_SMOOTHING = 8 };
 /* The most smoothing, which is a sixth of the width of a yarn of some forty fibers. */
 static const double most_smooth_radii = 4.0;
-/* Paths of each of the two renderings: so many on a square millimetre, since smoothing goes by the size of fibers and not
- * by that of tiles. A path takes as long as `as_photograph` of a path of a photograph. */
+/* Paths of each of the two renderings: so many on a square millimetre, since smoothing goes by the size of fibers and
+ * not of tiles. A path takes as long as `as_photograph` of a path of a photograph. */
 static const double paths_per_mm2 = 2e6, least_paths = 2.5e5, most_paths = 4e6, as_photograph = 0.6;
 static const double mm = 1e3, mm_of_cm = 10.0;
 
@@ -61,7 +61,7 @@ static status half_sphere(bool above, struct environment **environment, struct e
     return s;
 }
 
-/* Two halves of the samples, of which each has n. */
+/* Renders two halves of the samples. */
 static status render_halves(const struct export_scene *e, const struct render_request *q, const double part[2],
                             struct image half[2], struct error *err)
 {

@@ -1,5 +1,5 @@
-/* The archive of a U3M material and its pictures in one file: a zip of which the specification of U3M 1.1
- * (u3m_additional_spec_u3ma.txt) allows a part only. Names are UTF-8, sizes stand before the data, there are no extra
+/* The archive of a U3M material and its pictures in one file: the part of the zip format that U3M 1.1
+ * (u3m_additional_spec_u3ma.txt) allows. Names are UTF-8, sizes stand before the data, there are no extra
  * fields, comments or attributes, and times are UTC. That is less than libarchive writes. Nothing is compressed,
  * because the pictures are already. */
 #ifndef SELVEDGE_OPTIMIZER_U3MA_FILE_H
