@@ -13,8 +13,8 @@
 #include "renderer/image/image.h"
 
 /* half: two renderings from independent samples, rgb first. out: initialised with 3 channels. sd_mm: standard deviation
- * of the smoothing; 0: out is the mean of both. *noise: of a pixel of out, root mean square over the root mean square of out, from
- * the difference of what both halves become. STATUS_NO_MEMORY. */
+ * of the smoothing; 0: out is the mean of both. *noise: of a pixel of out, root mean square over the root mean square
+ * of out, from the difference of what both halves become. STATUS_NO_MEMORY. */
 status texture_smooth(const struct texture_maps *m, const struct image half[2], double sd_mm, struct image *out,
                       double *noise, struct error *err);
 
