@@ -215,7 +215,7 @@ $(BUILD)/tools/wave-tables: $(BUILD)/obj/$(WAVE)/wave_tables_main.c.o $(BUILD)/o
 		$(patsubst %,$(BUILD)/obj/%.o,$(wildcard renderer/scattering/models/wave/solver/*.c)) $(L)base.a
 	@mkdir -p $(@D)
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_WAVE) $(LINK_BASE)
-wave-tables: $(BUILD)/tools/wave-tables ## make the tables of wave_silk.v1 and its like again (two minutes of a core; a third of it with libopenblas0-serial)
+wave-tables: $(BUILD)/tools/wave-tables ## make the tables of wave_silk.v2 and its like again (twenty minutes of a core; half of it with libopenblas0-serial)
 	@$(BUILD)/tools/wave-tables $(WAVE)
 
 # tables of speckle, checked in as source; made again after a change of a section, of the roughness or of the bands
@@ -223,7 +223,7 @@ $(BUILD)/tools/speckle-tables: $(addprefix $(BUILD)/obj/$(WAVE)/,speckle_tables_
 		$(BUILD)/obj/$(WAVE)/wave_sections.c.o $(patsubst %,$(BUILD)/obj/%.o,$(wildcard renderer/scattering/models/wave/solver/*.c)) $(L)base.a
 	@mkdir -p $(@D)
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_WAVE) $(LINK_BASE)
-speckle-tables: $(BUILD)/tools/speckle-tables ## make the tables of speckle of wave_silk.v1 and its like again (three minutes of a core)
+speckle-tables: $(BUILD)/tools/speckle-tables ## make the tables of speckle of wave_silk.v2 and its like again (three minutes of a core)
 	@$(BUILD)/tools/speckle-tables $(WAVE)/wave_speckle.c
 
 include config/install.mk

@@ -1,6 +1,7 @@
 # Benchmarks, and pictures of the documentation that come from them.
 .PHONY: bench bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics gallery docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
+$(BUILD)/tests/bench/models/bench_waves: LINK_TEST := $(LINK_WAVE)
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
 $(BUILD)/tests/bench/verdict/bench_verdict: $(BUILD)/obj/tests/bench/verdict/line_pulls.c.o
@@ -31,10 +32,11 @@ bench-exact: | deps-test ## the renderer's scene against the cloth by definition
 	@/usr/bin/python3 tests/exact/bench_exact.py --build $(BUILD) $(EXACT)
 
 # MODELS: some of them only, such as MODELS="chiang.v1 elliptical.v1"
-bench-models: | deps-test ## what every scattering model costs and what light it loses; fur fitted to profiles of single fibers (four minutes)
-	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/models/bench_models $(BUILD)/tests/bench/models/bench_profiles >&2
+bench-models: | deps-test ## what every scattering model costs and what light it loses; fur fitted to profiles of single fibers; the solver of waves (four minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(addprefix $(BUILD)/tests/bench/models/,bench_models bench_profiles bench_waves) >&2
 	@$(BUILD)/tests/bench/models/bench_models 4096 5 $(MODELS)
 	@$(BUILD)/tests/bench/models/bench_profiles
+	@$(BUILD)/tests/bench/models/bench_waves
 
 # MODELS: as above
 bench-recovery: | deps-test ## whether a fit of each surface model finds its own parameters again (an hour on 2 quiet cores; photographs are kept in build)

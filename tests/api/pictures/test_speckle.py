@@ -4,7 +4,7 @@ from daemon_under_test import problem
 from test_ground import rendered
 from test_surface_pictures import VIEW, document, render, run
 
-SILK = {"model": "wave_silk.v1", "fixed": {"C_T": [0.8] * 3, "beta": 8, "gamma": 8}}
+SILK = {"model": "wave_silk.v2", "fixed": {"C_T": [0.8] * 3, "beta": 8, "gamma": 8}}
 FLAT = {"on": "flat", "width_mm": 0.5, **VIEW}
 
 
@@ -22,9 +22,9 @@ def test_a_seed_makes_a_pattern(tmp_path):
 @pytest.mark.parametrize("picture, fit, field, word", [
     ({}, {"model": "two_lobe.v1"}, "pictures[0].speckle", "'two_lobe.v1' has no speckle"),
     ({}, {}, "pictures[0].speckle", "'textile.v3' has no speckle"),
-    ({}, {"models": ["wave_silk.v1", "chiang.v1"]}, "pictures[0].speckle", "'chiang.v1' has no speckle"),
-    ({"method": "dual"}, {"model": "wave_silk.v1"}, "pictures[0].speckle", "not \"path\""),
-    ({}, {"model": "wave_silk.v1", "speckle": True}, "fit.speckle", "speckle")])
+    ({}, {"models": ["wave_silk.v2", "chiang.v1"]}, "pictures[0].speckle", "'chiang.v1' has no speckle"),
+    ({"method": "dual"}, {"model": "wave_silk.v2"}, "pictures[0].speckle", "not \"path\""),
+    ({}, {"model": "wave_silk.v2", "speckle": True}, "fit.speckle", "speckle")])
 def test_what_has_no_speckle(real, picture, fit, field, word):
     doc = {**document({**FLAT, "speckle": True, **picture}), "fit": fit}
     assert word in problem(real.post("/v1/jobs", json=doc), 422, "invalid", field)["detail"]

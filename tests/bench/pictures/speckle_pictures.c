@@ -68,7 +68,7 @@ static status draw(struct thread_pool *pool, const struct scene *scene, size_t n
     status st = image_init(&whole, WIDTH, PANEL, 3, err);
     for (size_t i = 0; i < WIDTH * PANEL * 3 && st == STATUS_OK; i++) whole.pixel[i] = 1 / EXPOSURE;
     for (int half = 0; half < 2 && st == STATUS_OK; half++) {
-        struct render_request q = {.input = trace_input_surface(scene, scattering_find("wave_silk.v1"), param, &model),
+        struct render_request q = {.input = trace_input_surface(scene, scattering_find("wave_silk.v2"), param, &model),
                                    .configuration = &c,
                                    .width = PANEL,
                                    .height = PANEL,

@@ -19,8 +19,7 @@ const struct mie_published mie_published[MIE_N_PUBLISHED] = {
 
 enum { MORE_ORDERS = 60 };
 
-/* J_0(x) .. J_n(x): the recurrence downwards, which is stable, scaled by J_0 + 2 (J_2 + J_4 + ...) = 1. */
-static void bessel_j(double x, size_t n, double *j)
+void mie_bessel_j(double x, size_t n, double *j)
 {
     size_t from = n + MORE_ORDERS + (size_t)(4 * cbrt(x));
     double above = 0, here = 1e-300, sum = 0;
@@ -41,8 +40,7 @@ static void bessel_j(double x, size_t n, double *j)
     for (size_t k = 0; k <= n; k++) j[k] /= sum;
 }
 
-/* D_k(z) = J_k'(z) / J_k(z) by the recurrence downwards. */
-static void log_derivative(double complex z, size_t n, double complex *d)
+void mie_log_derivative(double complex z, size_t n, double complex *d)
 {
     const size_t from = (size_t)fmax((double)n, cabs(z)) + MORE_ORDERS;
     double complex here = 0;
@@ -63,8 +61,8 @@ int mie_cylinder_init(struct mie_cylinder *c, double x, double complex m, enum m
     c->x = x;
     c->n_order = 0;
     if (j != NULL && d != NULL) {
-        bessel_j(x, n + 1, j);
-        if (!isinf(creal(m))) log_derivative(m * x, n, d);
+        mie_bessel_j(x, n + 1, j);
+        if (!isinf(creal(m))) mie_log_derivative(m * x, n, d);
         double y = y0(x), y_before = -y1(x); /* Y_-1 = -Y_1, and J_-1 = -J_1 */
         for (size_t k = 0; k <= n; k++) {
             const double order = (double)k, j_before = k > 0 ? j[k - 1] : -j[1];

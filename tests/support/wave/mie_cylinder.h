@@ -34,6 +34,11 @@ double mie_extinction(const struct mie_cylinder *c);
 double mie_scattering(const struct mie_cylinder *c);
 double complex mie_amplitude(const struct mie_cylinder *c, double angle_rad);
 
+/* J_0(x) .. J_n(x): the recurrence downwards, which is stable, scaled by J_0 + 2 (J_2 + J_4 + ...) = 1. */
+void mie_bessel_j(double x, size_t n, double *j);
+/* D_k(z) = J_k'(z) / J_k(z) by the recurrence downwards. */
+void mie_log_derivative(double complex z, size_t n, double complex *d);
+
 /* Efficiencies by treams 0.4.7 (Beutel, Fernandez-Corbaton and Rockstuhl 2024, "treams - a T-matrix-based scattering
  * code for nanophotonics"; treams.coeffs.mie_cyl at kz = 0), which SciPy's Bessel functions in the formulas above
  * repeat to 1e-13. */

@@ -1,4 +1,4 @@
-/* wave_silk.v1, wave_trilobal.v1, wave_cotton.v1: evaluation with scores, and sampling (wave_fiber.h states the model).
+/* wave_silk.v2, wave_trilobal.v2, wave_cotton.v2: evaluation with scores, and sampling (wave_fiber.h states the model).
  *
  * Sampling of wi: th_i normally distributed about the cone of the mirror, beyond a pole taken as the direction on its
  * other side; a channel by its light that leaves and its weight; an azimuth from N of this channel at th_d = th_o, and

@@ -1,19 +1,21 @@
-/* wave_silk.v1, wave_trilobal.v1, wave_cotton.v1: fibers of a few micrometers whose sections scatter light as waves,
+/* wave_silk.v2, wave_trilobal.v2, wave_cotton.v2: fibers of a few micrometers whose sections scatter light as waves,
  * seen from afar and turned at random about their axes. Reciprocal; lossless from both sides where C_T = 1.
  *
- *     S = a(th_i) a(th_o) g(th_i + th_o; beta) N(ph; C_T^(1 / cos th_t), gamma),   sin th_t = sin th_d / index
+ *     S = a(th_i) a(th_o) g(th_i + th_o; beta) N(ph; C_T, th_d, gamma)
  *
  * after Xia et al. 2020, "A Wave Optics Based Fiber Scattering Model". N is the table of the section (wave_table.h),
- * made by a solver of Maxwell's equations across the fiber and blurred by a wrapped Gaussian D of the width gamma,
- * which multiplies the Fourier coefficient k by exp(-k^2 gamma^2 / 2). g is a Gaussian, and a(th) balances it
- * (lobe_balance.h).
+ * made by a solver of Maxwell's equations for waves at the angle th_d to the plane across the fiber, and blurred by a
+ * wrapped Gaussian D of the width gamma, which multiplies the Fourier coefficient k by exp(-k^2 gamma^2 / 2). g is a
+ * Gaussian, and a(th) balances it (lobe_balance.h).
  *
- * Approximations: across the fiber the waves are exact; for oblique light the section scatters as for normal
- * incidence, but for the longer way through the dye. One lobe along the fiber serves all light.
+ * Approximations: light off the cone of the mirror, where th_i = -th_o = th_d, has the azimuths of this cone; one lobe
+ * along the fiber serves all light.
+ *
+ * v1 had tables of light across the fiber alone: as much went back at every angle along it.
  *
  * Differs from the publication: the orientation of the section, the size and the wavelengths of a channel are averaged
  * over; the forward lobe of diffraction is taken away (wave_mean.h), so that fibers are met within their own width and
- * none has to be widened; a table holds 1746 numbers in place of 6.5e8; a(th) takes the place of 1 / cos th.
+ * none has to be widened; a table holds 14580 numbers in place of 6.5e8; a(th) takes the place of 1 / cos th.
  *
  * N is tabulated for N_ROW + 1 values of cos th_d and read between N_PHI + 1 azimuths by straight lines. Derivatives
  * are exact for the tabulated function.

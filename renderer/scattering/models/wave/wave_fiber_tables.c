@@ -13,14 +13,28 @@ struct work {
     double column[N_QUANTITY][WAVE_N_PHI + 1];
 };
 
-/* Fourier coefficient k of a channel, and its derivatives, for a value of C whose cube root has these weights. */
-static void wave_of(const struct wave_table *table, int channel, int k, double weight[2][WAVE_TABLE_N_CLEAR],
-                    double gamma, double out[N_QUANTITY])
+/* Weights of the table at a row and a C_T: of theta; of C, and their derivatives by C_T. */
+struct place {
+    double tilt[WAVE_TABLE_N_TILT], clear[2][WAVE_TABLE_N_CLEAR];
+};
+
+static void find_place(struct place *at, double cosine, double c_t)
 {
-    const double blur = exp(-0.5 * pow(k * gamma, 2)) * (k == 0 ? 0.5 / M_PI : 1 / M_PI);
+    const double root = fmax(cbrt(c_t), wave_table_root(0)), by_c_t = root / (3 * c_t);
+    wave_table_tilt_weights(cosine, at->tilt);
+    wave_table_weights(root, at->clear[0], at->clear[1]);
+    for (int i = 0; i < WAVE_TABLE_N_CLEAR; i++) at->clear[1][i] *= by_c_t;
+}
+
+/* Fourier coefficient k of a channel, and its derivatives. */
+static void wave_of(const struct wave_table *table, int channel, int k, const struct place *at, double gamma,
+                    double out[N_QUANTITY])
+{
+    const double blur = exp(-0.5 * pow(k * gamma, 2)) * (k == 0 ? 0.5 / M_PI : 1 / M_PI) / WAVE_TABLE_ONE;
     double sum[2] = {0, 0};
-    for (int i = 0; i < WAVE_TABLE_N_CLEAR; i++)
-        for (int q = 0; q < 2; q++) sum[q] += weight[q][i] * (double)table->wave[channel][i][k];
+    for (int t = 0; t < WAVE_TABLE_N_TILT; t++)
+        for (int i = 0; i < WAVE_TABLE_N_CLEAR; i++)
+            for (int q = 0; q < 2; q++) sum[q] += at->tilt[t] * at->clear[q][i] * (double)table->wave[t][channel][i][k];
     out[VALUE] = blur * sum[0];
     out[BY_C_T] = blur * sum[1];
     out[BY_GAMMA] = -(double)k * k * gamma * out[VALUE];
@@ -29,19 +43,12 @@ static void wave_of(const struct wave_table *table, int channel, int k, double w
 static void fill_channel(struct scattering_state *s, struct work *w, const struct wave_table *table, int row,
                          int channel, const double *param)
 {
-    const double cosine = (double)row / WAVE_N_ROW, c_t = param[WAVE_P_C_T + channel];
-    const double longer = 1 / sqrt(1 - (1 - cosine * cosine) / (table->index * table->index));
-    double root = pow(c_t, longer / 3), weight[2][WAVE_TABLE_N_CLEAR], by_c_t = root * longer / (3 * c_t);
-    if (root < wave_table_root(0)) {
-        root = wave_table_root(0);
-        by_c_t = 0;
-    }
-    wave_table_weights(root, weight[0], weight[1]);
-    for (int i = 0; i < WAVE_TABLE_N_CLEAR; i++) weight[1][i] *= by_c_t;
+    struct place at;
+    find_place(&at, (double)row / WAVE_N_ROW, param[WAVE_P_C_T + channel]);
     memset(w->column, 0, sizeof w->column);
     for (int k = 0; k <= N_WAVE && k * param[WAVE_P_GAMMA] < LEAST_FACTOR; k++) {
         double wave[N_QUANTITY];
-        wave_of(table, channel, k, weight, param[WAVE_P_GAMMA], wave);
+        wave_of(table, channel, k, &at, param[WAVE_P_GAMMA], wave);
         for (int q = 0; q < N_QUANTITY; q++)
             for (int j = 0; j <= WAVE_N_PHI; j++) w->column[q][j] += wave[q] * w->cosine[k][j];
         if (k == 0) s->row[row].energy[channel][channel] = (float)(2 * M_PI * wave[VALUE]);

@@ -19,16 +19,31 @@ static void cotton(struct wave_outline *o) { wave_outline_bean(o, 7, 3, 0.35); }
 const struct wave_section wave_sections[WAVE_N_SECTION] = {
     {"silk", 4.7e-6, 1.55, silk}, {"trilobal", 4.55e-6, 1.6, trilobal}, {"cotton", 4.58e-6, 1.55, cotton}};
 
-void wave_table_weights(double root, double weight[WAVE_TABLE_N_CLEAR], double slope[WAVE_TABLE_N_CLEAR])
+/* Lagrange's polynomials of n nodes at x, factor by factor, and their slopes. */
+static void lagrange(const double *node, int n, double x, double *weight, double *slope)
 {
-    for (int i = 0; i < WAVE_TABLE_N_CLEAR; i++) { /* Lagrange's polynomials, factor by factor */
+    for (int i = 0; i < n; i++) {
         weight[i] = 1;
         slope[i] = 0;
-        for (int j = 0; j < WAVE_TABLE_N_CLEAR; j++) {
+        for (int j = 0; j < n; j++) {
             if (j == i) continue;
-            const double inv = 1 / (wave_table_root(i) - wave_table_root(j)), f = (root - wave_table_root(j)) * inv;
+            const double inv = 1 / (node[i] - node[j]), f = (x - node[j]) * inv;
             slope[i] = slope[i] * f + weight[i] * inv;
             weight[i] *= f;
         }
     }
+}
+
+void wave_table_weights(double root, double weight[WAVE_TABLE_N_CLEAR], double slope[WAVE_TABLE_N_CLEAR])
+{
+    double node[WAVE_TABLE_N_CLEAR];
+    for (int i = 0; i < WAVE_TABLE_N_CLEAR; i++) node[i] = wave_table_root(i);
+    lagrange(node, WAVE_TABLE_N_CLEAR, root, weight, slope);
+}
+
+void wave_table_tilt_weights(double cosine, double weight[WAVE_TABLE_N_TILT])
+{
+    double node[WAVE_TABLE_N_TILT], slope[WAVE_TABLE_N_TILT];
+    for (int i = 0; i < WAVE_TABLE_N_TILT; i++) node[i] = wave_table_cosine(i);
+    lagrange(node, WAVE_TABLE_N_TILT, fmin(fmax(cosine, node[0]), 1), weight, slope);
 }

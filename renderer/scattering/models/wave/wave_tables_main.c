@@ -1,5 +1,5 @@
-/* Makes the tables of azimuthal scattering by waves (wave_table.h): solves for every size over wavelength, polarisation
- * and absorption, and writes them as C source. 40 s of a core for each section.
+/* Makes the tables of azimuthal scattering by waves (wave_table.h): solves for every size over wavelength, angle to the
+ * axis and absorption, and writes them as C source. Two minutes of a core for each section.
  *
  * wave-tables FOLDER [SECTION]
  * wave-tables FOLDER NAME OUTLINE.csv RADIUS_UM INDEX
@@ -9,9 +9,10 @@
  *              become as round as a series of OUTLINE_WAVES waves makes them
  *   RADIUS_UM  of a circle of the section's area
  *   INDEX      of refraction
- * Prints for each section the time, the size and three errors, each the root mean square over azimuths of a difference,
+ * Prints for each section the time, the size and four errors, each the root mean square over azimuths of a difference,
  * over the root mean square of N, for a blur of 5 degrees: from N of one half of the sizes (speckle), from the exact N
- * between the values of C, and of the light that a fiber meets from its width, a difference that the tables neglect.
+ * between the values of C, from the exact N between the values of theta, and of the light that a fiber meets from its
+ * width, a difference that the tables neglect.
  */
 #include "base/clock.h"
 #include "base/thread_pool.h"
@@ -22,20 +23,27 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_SIZE = 9, N_CLEAR = WAVE_TABLE_N_CLEAR, CHECK = N_CLEAR, N_COLUMN, N_WAVE = WAVE_TABLE_N_WAVE };
-enum { CHECK_STEP = 4 }; /* so many sizes apart, values of C are checked */
-enum { OUTLINE_WAVES = 32 };
-enum { N_TASK = N_SIZE * N_COLUMN * WAVE_N_FIELD, MOST_COLUMN = 118 };
+enum { N_TILT = WAVE_TABLE_N_TILT, N_CLEAR = WAVE_TABLE_N_CLEAR, N_WAVE = WAVE_TABLE_N_WAVE };
+/* The points of the table, and those between them that check it. */
+enum {
+    N_TABLE = N_TILT * N_CLEAR,
+    N_CHECK_CLEAR = 2,
+    N_CHECK_TILT = 4,
+    N_POINT = N_TABLE + N_CHECK_CLEAR + N_CHECK_TILT
+};
+enum { N_SIZE = 17, N_TASK = N_SIZE * N_POINT, MOST_COLUMN = 120, OUTLINE_WAVES = 32 };
 
 #define CHECK_CLEAR 0.5 /* between the values of C of the table */
 #define REACH 2.2       /* sizes: standard deviations beyond the outer channels */
-#define PER_WAVE 3      /* nodes: errors below 1e-3 of the forward amplitude */
+/* Nodes: energy within 4e-3 for light across the fiber. Oblique waves inside are longer, but as many nodes by their
+ * length would leave 10 % at 85 degrees in trilobal fibers; these leave 1e-3. */
+#define PER_WAVE 3
 #define BLUR (5 * M_PI / 180)
 
 struct job {
     const struct wave_section *section;
     struct wave_outline outline; /* of radius 1 */
-    double wave[N_TASK][N_WAVE + 1], met[N_TASK];
+    double wave[N_SIZE][N_POINT][N_WAVE + 1], met[N_SIZE][N_POINT];
     status status[N_TASK];
     struct error error[N_TASK];
 };
@@ -58,44 +66,60 @@ static double log_size(const struct wave_section *s, int i)
     return low + (high - low) * i / (N_SIZE - 1);
 }
 
-static double clear_of(int column) { return column == CHECK ? CHECK_CLEAR : pow(wave_table_root(column), 3); }
+/* cos(theta) and C. */
+struct point {
+    double cosine, clear;
+};
+
+static int point_of(int i_tilt, int i_clear) { return i_tilt * N_CLEAR + i_clear; }
+
+/* Values of theta at which C is checked, and between which two of the table theta is. */
+static const int checked_tilt[N_CHECK_CLEAR] = {N_TILT - 1, N_TILT / 2}, checked_gap[N_CHECK_TILT] = {0, 2, 4, 7};
+
+static int checked_clear(int i) { return i % 2 == 0 ? N_CLEAR - 1 : N_CLEAR / 2; }
+
+static struct point point_at(int i)
+{
+    if (i < N_TABLE) return (struct point){wave_table_cosine(i / N_CLEAR), pow(wave_table_root(i % N_CLEAR), 3)};
+    if (i < N_TABLE + N_CHECK_CLEAR) return (struct point){wave_table_cosine(checked_tilt[i - N_TABLE]), CHECK_CLEAR};
+    const int k = i - N_TABLE - N_CHECK_CLEAR;
+    return (struct point){0.5 * (wave_table_cosine(checked_gap[k]) + wave_table_cosine(checked_gap[k] + 1)),
+                          pow(wave_table_root(checked_clear(k)), 3)};
+}
 
 static void solve(void *context, size_t i_task, size_t i_thread)
 {
     struct job *job = context;
-    const int i = (int)i_task / WAVE_N_FIELD;
+    const size_t i_size = i_task % N_SIZE, i_point = i_task / N_SIZE;
+    const struct point at = point_at((int)i_point);
+    const double x = exp(log_size(job->section, (int)i_size)), index = job->section->index;
     (void)i_thread;
-    if (i % N_COLUMN == CHECK && i / N_COLUMN % CHECK_STEP != 0) return;
-    const double x = exp(log_size(job->section, i / N_COLUMN)), index = job->section->index;
     /* a diameter lets through the share exp(-4 x Im(index)) */
-    const struct wave_problem p = {&job->outline, x, index - I * log(clear_of(i % N_COLUMN)) / (4 * x),
-                                   (enum wave_field)(i_task % WAVE_N_FIELD),
-                                   wave_solver_nodes(&job->outline, x, index, PER_WAVE)};
+    const struct oblique_problem p = {&job->outline, x, index - I * log(at.clear) / (4 * x), acos(at.cosine),
+                                      wave_solver_nodes(&job->outline, x, index, PER_WAVE)};
     struct wave_mean mean;
     job->status[i_task] = wave_mean_over_turns(&p, &mean, &job->error[i_task]);
     if (job->status[i_task] != STATUS_OK) return;
-    job->met[i_task] = mean.met;
+    job->met[i_size][i_point] = mean.met;
     for (int k = 0; k <= N_WAVE; k++) {
         double sum = 0;
         for (int j = 0; j < WAVE_MEAN_N_ANGLE; j++)
             sum +=
                 mean.density[j] * cos(2 * M_PI * ((double)k * j / WAVE_MEAN_N_ANGLE)) * (2 * M_PI / WAVE_MEAN_N_ANGLE);
-        job->wave[i_task][k] = k % 2 == 0 ? sum : -sum; /* straight on is half a turn from back */
+        job->wave[i_size][i_point][k] = k % 2 == 0 ? sum : -sum; /* straight on is half a turn from back */
     }
 }
 
-/* Mean over the polarisations and over every `step`-th size from `first`. */
-static void average(const struct job *job, int channel, int column, const int sizes[2], double wave[N_WAVE + 1])
+/* Mean over every `step`-th size from `first`. */
+static void average(const struct job *job, int channel, int point, const int sizes[2], double wave[N_WAVE + 1])
 {
     double weights = 0;
     memset(wave, 0, (N_WAVE + 1) * sizeof *wave);
     for (int i = sizes[0]; i < N_SIZE; i += sizes[1]) {
         const double off = (log_size(job->section, i) - center(job->section, channel)) / WAVE_TABLE_SPREAD;
-        const double weight = exp(-0.5 * off * off) / WAVE_N_FIELD;
-        weights += weight * WAVE_N_FIELD;
-        for (int field = 0; field < WAVE_N_FIELD; field++)
-            for (int k = 0; k <= N_WAVE; k++)
-                wave[k] += weight * job->wave[(i * N_COLUMN + column) * WAVE_N_FIELD + field][k];
+        const double weight = exp(-0.5 * off * off);
+        weights += weight;
+        for (int k = 0; k <= N_WAVE; k++) wave[k] += weight * job->wave[i][point][k];
     }
     for (int k = 0; k <= N_WAVE; k++) wave[k] /= weights;
 }
@@ -108,60 +132,100 @@ static double mean_square(const double wave[N_WAVE + 1])
     return sum;
 }
 
-static const int all_sizes[2] = {0, 1}, checked_sizes[2] = {0, CHECK_STEP};
+static const int all_sizes[2] = {0, 1};
 
 /* Half of the difference of both halves of the sizes. */
 static double speckle(const struct job *job)
 {
-    double difference = 0, size = 0;
+    double difference = 0;
     for (int c = 0; c < 3; c++)
-        for (int column = 0; column < N_CLEAR; column++) {
+        for (int point = 0; point < N_TABLE; point++) {
             double half[2][N_WAVE + 1];
-            for (int h = 0; h < 2; h++) average(job, c, column, (const int[2]){h, 2}, half[h]);
+            for (int h = 0; h < 2; h++) average(job, c, point, (const int[2]){h, 2}, half[h]);
             for (int k = 0; k <= N_WAVE; k++) {
                 const double mean = 0.5 * (half[0][k] + half[1][k]);
                 half[0][k] = 0.5 * (half[0][k] - half[1][k]);
                 half[1][k] = mean;
             }
             difference += mean_square(half[0]) / mean_square(half[1]);
-            size += 1;
         }
-    return sqrt(difference / size);
+    return sqrt(difference / (3 * N_TABLE));
+}
+
+/* Mean over the channels of the squared difference of a point from its value by n points of the table. */
+static double interpolation_error(const struct job *job, int point, const int *node, const double *weight, int n)
+{
+    double sum = 0;
+    for (int c = 0; c < 3; c++) {
+        double want[N_WAVE + 1], off[N_WAVE + 1], wave[N_WAVE + 1];
+        average(job, c, point, all_sizes, want);
+        memcpy(off, want, sizeof off);
+        for (int i = 0; i < n; i++) {
+            average(job, c, node[i], all_sizes, wave);
+            for (int k = 0; k <= N_WAVE; k++) off[k] -= weight[i] * wave[k];
+        }
+        sum += mean_square(off) / mean_square(want) / 3;
+    }
+    return sum;
 }
 
 static double between_clears(const struct job *job)
 {
     double weight[N_CLEAR], slope[N_CLEAR], sum = 0;
     wave_table_weights(cbrt(CHECK_CLEAR), weight, slope);
-    for (int c = 0; c < 3; c++) {
-        double want[N_WAVE + 1], off[N_WAVE + 1], wave[N_WAVE + 1];
-        average(job, c, CHECK, checked_sizes, want);
-        memcpy(off, want, sizeof off);
-        for (int i = 0; i < N_CLEAR; i++) {
-            average(job, c, i, checked_sizes, wave);
-            for (int k = 0; k <= N_WAVE; k++) off[k] -= weight[i] * wave[k];
-        }
-        sum += mean_square(off) / mean_square(want) / 3;
+    for (int k = 0; k < N_CHECK_CLEAR; k++) {
+        int node[N_CLEAR];
+        for (int i = 0; i < N_CLEAR; i++) node[i] = point_of(checked_tilt[k], i);
+        const double off = interpolation_error(job, N_TABLE + k, node, weight, N_CLEAR);
+        printf("  cos(theta) %.3f, C %.2f: %.4f from the table\n", wave_table_cosine(checked_tilt[k]), CHECK_CLEAR,
+               sqrt(off));
+        sum += off / N_CHECK_CLEAR;
     }
     return sqrt(sum);
 }
 
-/* One channel and value of C, in lines of at most MOST_COLUMN. */
-static void write_waves(FILE *f, const double wave[N_WAVE + 1])
+static double between_tilts(const struct job *job)
 {
-    int column = 0;
-    fprintf(f, "{\n");
+    double sum = 0;
+    for (int k = 0; k < N_CHECK_TILT; k++) {
+        const int point = N_TABLE + N_CHECK_CLEAR + k;
+        double weight[N_TILT];
+        int node[N_TILT];
+        wave_table_tilt_weights(point_at(point).cosine, weight);
+        for (int i = 0; i < N_TILT; i++) node[i] = point_of(i, checked_clear(k));
+        const double off = interpolation_error(job, point, node, weight, N_TILT);
+        printf("  cos(theta) %.3f, C %.2f: %.4f from the table\n", point_at(point).cosine, point_at(point).clear,
+               sqrt(off));
+        sum += off / N_CHECK_TILT;
+    }
+    return sqrt(sum);
+}
+
+/* A file that breaks lines before they exceed MOST_COLUMN. */
+struct lines {
+    FILE *file;
+    int column;
+};
+
+static void write_text(struct lines *l, const char *text)
+{
+    if (l->column + (int)strlen(text) > MOST_COLUMN) {
+        fprintf(l->file, "\n");
+        l->column = 0;
+    }
+    l->column += fprintf(l->file, "%s", text);
+}
+
+/* One angle, channel and value of C. */
+static void write_waves(struct lines *l, const double wave[N_WAVE + 1])
+{
+    write_text(l, "{");
     for (int k = 0; k <= N_WAVE; k++) {
         char number[32];
-        snprintf(number, sizeof number, "%.5fF,", wave[k]);
-        column += (int)strlen(number);
-        if (column > MOST_COLUMN) {
-            fprintf(f, "\n");
-            column = (int)strlen(number);
-        }
-        fprintf(f, "%s", number);
+        snprintf(number, sizeof number, k < N_WAVE ? "%ld," : "%ld", lround(WAVE_TABLE_ONE * wave[k]));
+        write_text(l, number);
     }
-    fprintf(f, "\n},");
+    write_text(l, "},");
 }
 
 static void write_table(const struct job *job, const char *folder)
@@ -173,20 +237,36 @@ static void write_table(const struct job *job, const char *folder)
     fprintf(f,
             "/* Made by wave-tables (`make wave-tables`), not by hand; wave_table.h defines it. */\n"
             "#include \"renderer/scattering/models/wave/wave_table.h\"\n\n/* clang-format off */\n"
-            "const struct wave_table wave_%s_table = {%g, {\n",
-            job->section->name, job->section->index);
-    for (int c = 0; c < 3; c++) {
-        fprintf(f, "{");
-        for (int i = 0; i < N_CLEAR; i++) {
-            double wave[N_WAVE + 1];
-            average(job, c, i, all_sizes, wave);
-            if (i == N_CLEAR - 1) wave[0] = 1; /* nothing is absorbed */
-            write_waves(f, wave);
+            "const struct wave_table wave_%s_table = {{\n",
+            job->section->name);
+    struct lines l = {f, 0};
+    for (int t = 0; t < N_TILT; t++)
+        for (int c = 0; c < 3; c++) {
+            write_text(&l, c == 0 ? "{{" : "{");
+            for (int i = 0; i < N_CLEAR; i++) {
+                double wave[N_WAVE + 1];
+                average(job, c, point_of(t, i), all_sizes, wave);
+                if (i == N_CLEAR - 1) wave[0] = 1; /* nothing is absorbed */
+                write_waves(&l, wave);
+            }
+            write_text(&l, c == 2 ? "}}," : "},");
         }
-        fprintf(f, "},\n");
-    }
-    fprintf(f, "}};\n/* clang-format on */\n");
+    fprintf(f, "\n}};\n/* clang-format on */\n");
     if (fclose(f) != 0) stop("cannot write to the folder");
+}
+
+/* Turns an outline that is symmetric about the y axis, where t = pi / 2 is, so that it is so about the x axis: then the
+ * solver uses the mirror. */
+static void lay_mirror(struct wave_outline *o)
+{
+    double imaginary = 0, real = 0;
+    struct wave_outline turned = *o;
+    wave_outline_turn_quarter(&turned);
+    for (int k = 0; k <= o->n_wave; k++) {
+        imaginary += fabs(cimag(turned.forward[k])) + fabs(cimag(turned.backward[k]));
+        real += fabs(creal(turned.forward[k])) + fabs(creal(turned.backward[k]));
+    }
+    if (imaginary < 1e-12 * real) *o = turned;
 }
 
 static void make(struct thread_pool *pool, const struct wave_section *section, const struct wave_outline *outline,
@@ -200,18 +280,20 @@ static void make(struct thread_pool *pool, const struct wave_section *section, c
     job->section = section;
     job->outline = *outline;
     wave_outline_scale(&job->outline, 1 / sqrt(wave_outline_area(&job->outline) / M_PI));
+    lay_mirror(&job->outline);
     if (wave_outline_check(&job->outline, &err) != STATUS_OK) stop(err.text);
     if (thread_pool_run(pool, N_TASK, solve, job, NULL) != STATUS_OK) stop("not all was solved");
     for (int i = 0; i < N_TASK; i++) {
+        const double met = job->met[i % N_SIZE][i / N_SIZE];
         if (job->status[i] != STATUS_OK) stop(job->error[i].text);
-        if (!(job->met[i] > 0)) continue; /* not checked */
-        least = fmin(least, job->met[i]);
-        most = fmax(most, job->met[i]);
+        least = fmin(least, met);
+        most = fmax(most, met);
     }
     write_table(job, folder);
-    printf("%s: x = %.1f to %.1f, %zu bytes, %.1f s; speckle %.4f, between values of C %.4f, light met %.3f to %.3f\n",
+    printf("%s: x = %.1f to %.1f, %zu bytes, %.1f s; speckle %.4f, light met %.3f to %.3f; between values of C %.4f, ",
            section->name, exp(log_size(section, 0)), exp(log_size(section, N_SIZE - 1)), sizeof(struct wave_table),
-           clock_monotonic_s() - start, speckle(job), between_clears(job), least, most);
+           clock_monotonic_s() - start, speckle(job), least, most, between_clears(job));
+    printf("of theta %.4f\n", between_tilts(job));
     free(job);
 }
 

@@ -27,7 +27,7 @@ static int set_up(void **state)
 {
     (void)state;
     struct fiber_set f;
-    const struct scattering_model *m = scattering_find("wave_silk.v1");
+    const struct scattering_model *m = scattering_find("wave_silk.v2");
     for (size_t p = 0; p < m->n_param; p++) start[p] = m->param[p].start;
     orbit_configurations_16(configuration);
     hand_weave_small(&f);
@@ -45,7 +45,7 @@ static int tear_down(void **state)
 
 static struct render_request request(const struct configuration *c)
 {
-    return (struct render_request){.input = trace_input_surface(scene, scattering_find("wave_silk.v1"), start, &model),
+    return (struct render_request){.input = trace_input_surface(scene, scattering_find("wave_silk.v2"), start, &model),
                                    .configuration = c,
                                    .width = PX,
                                    .height = PX,

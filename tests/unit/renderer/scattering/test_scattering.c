@@ -301,7 +301,7 @@ static void reciprocal_models_are(void **state)
     static const char *const id[] = {"two_lobe_balanced.v1", "isotropic.v1",     "kajiya_kay.v1",
                                      "marschner.v1",         "textile.v3",       "dielectric.v1",
                                      "elliptical.v1",        "fur.v1",           "dielectric_diffraction.v1",
-                                     "wave_silk.v1",         "wave_trilobal.v1", "wave_cotton.v1",
+                                     "wave_silk.v2",         "wave_trilobal.v2", "wave_cotton.v2",
                                      "microfacet_ellipse.v1"};
     for (size_t k = 0; k < sizeof id / sizeof id[0]; k++) {
         const struct scattering_model *m = scattering_find(id[k]);

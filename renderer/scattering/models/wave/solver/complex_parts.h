@@ -15,4 +15,10 @@ static inline double complex complex_of(double re, double im)
     return both.z;
 }
 
+/* A product without the checks for infinities that C asks for. */
+static inline double complex complex_product(double complex a, double complex b)
+{
+    return complex_of(creal(a) * creal(b) - cimag(a) * cimag(b), creal(a) * cimag(b) + cimag(a) * creal(b));
+}
+
 #endif

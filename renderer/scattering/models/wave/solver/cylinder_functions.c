@@ -9,12 +9,6 @@
 
 enum { N_TERM = 34 };
 
-/* Products without the checks for infinities that C asks for. */
-static inline double complex times(double complex a, double complex b)
-{
-    return complex_of(creal(a) * creal(b) - cimag(a) * cimag(b), creal(a) * cimag(b) + cimag(a) * creal(b));
-}
-
 static void by_recurrence(double complex z, struct cylinder_functions *f)
 {
     const int n = 2 * (int)(0.6 * cabs(z) + 15);
@@ -23,20 +17,21 @@ static void by_recurrence(double complex z, struct cylinder_functions *f)
     for (int k = n; k > 0; k--) { /* here = J_k */
         const int half = k / 2;
         const double sign = half % 2 == 0 ? 1 : -1;
-        sum += 2 * times(turn[k % 4], here);
+        sum += 2 * complex_product(turn[k % 4], here);
         if (k % 2 == 0)
             y0_sum += sign / half * here;
         else if (half > 0)
             y1_sum += sign * k / (half * (half + 1.0)) * here;
-        const double complex below = 2 * k * times(inv, here) - above;
+        const double complex below = 2 * k * complex_product(inv, here) - above;
         above = here;
         here = below;
     }
     const double complex scale = cexp(-I * z) / (sum + here), log_half = clog(0.5 * z) + EULER;
-    f->j[0] = times(here, scale);
-    f->j[1] = times(above, scale);
-    const double complex y0 = times(log_half, f->j[0]) - 2 * times(y0_sum, scale);
-    const double complex y1 = times(log_half - 1, f->j[1]) - times(y1_sum, scale) - times(inv, f->j[0]);
+    f->j[0] = complex_product(here, scale);
+    f->j[1] = complex_product(above, scale);
+    const double complex y0 = complex_product(log_half, f->j[0]) - 2 * complex_product(y0_sum, scale);
+    const double complex y1 =
+        complex_product(log_half - 1, f->j[1]) - complex_product(y1_sum, scale) - complex_product(inv, f->j[0]);
     f->h[0] = f->j[0] + I * M_2_PI * y0;
     f->h[1] = f->j[1] + I * M_2_PI * y1;
 }
@@ -49,7 +44,7 @@ static void asymptotic_series(double complex inv, double square, double complex 
     *iq = 0;
     for (int k = 1; k <= N_TERM; k++) {
         const double odd = 2 * k - 1;
-        term = times(term, step) * ((square - odd * odd) / k);
+        term = complex_product(term, step) * ((square - odd * odd) / k);
         if (k % 2 == 0)
             *p += term;
         else
@@ -65,9 +60,9 @@ static void far_away(double complex z, struct cylinder_functions *f)
     for (int order = 0; order < 2; order++) {
         double complex p, iq;
         asymptotic_series(inv, 4.0 * order, &p, &iq);
-        f->h[order] = times(root, times(wave, p + iq));
-        f->j[order] = 0.5 * (f->h[order] + times(root, (p - iq) / wave));
-        wave = times(wave, -I);
+        f->h[order] = complex_product(root, complex_product(wave, p + iq));
+        f->j[order] = 0.5 * (f->h[order] + complex_product(root, (p - iq) / wave));
+        wave = complex_product(wave, -I);
     }
 }
 

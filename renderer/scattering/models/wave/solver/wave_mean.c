@@ -1,8 +1,6 @@
 #include "renderer/scattering/models/wave/solver/wave_mean.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #define PENUMBRA 1.8 /* of the angle x^(-1/3) */
 
@@ -18,22 +16,40 @@ double complex wave_shadow_amplitude(double k, const double range[2], double d)
     return 0.5 * k * exp(-part * part) * width * sinc(0.5 * q * width) * cexp(-I * q * middle);
 }
 
-/* Sums over the orientations, by the angle from straight on. */
-static void add_amplitudes(const struct wave_solver *s, double k, double (*range)[2], double *power)
+/* The waves that are solved for. Of an outline with a mirror, one of each mirrored pair stands for both. */
+struct turns {
+    size_t n;
+    double angle_rad[N_TURN], range[N_TURN][2], weight[N_TURN];
+};
+
+static void choose_turns(const struct wave_outline *o, bool symmetric, struct turns *turns)
 {
-    for (size_t j = 0; j < N; j++) {
-        double complex t[N_TURN];
-        wave_solver_towards(s, 2 * M_PI * (double)j / N, t);
-        for (size_t w = 0; w < N_TURN; w++) {
-            const size_t i = (j + N - w * PER_TURN) % N;
-            const double complex left =
-                t[w] - wave_shadow_amplitude(k, range[w], remainder(2 * M_PI * (double)i / N, 2 * M_PI));
-            power[i] += creal(left) * creal(left) + cimag(left) * cimag(left);
+    turns->n = symmetric ? (N_TURN + 1) / 2 : N_TURN;
+    for (size_t w = 0; w < turns->n; w++) {
+        turns->angle_rad[w] = 2 * M_PI * (double)w / N_TURN;
+        turns->weight[w] = symmetric && w > 0 ? 2 : 1;
+        wave_outline_extent(o, turns->angle_rad[w], turns->range[w]);
+    }
+}
+
+/* Adds the power in one direction to that by the angle from straight on. t: amplitudes by exitant and incident field
+ * and wave. */
+static void add_direction(const struct turns *turns, size_t i_direction, double kappa, const double complex *t,
+                          double *power)
+{
+    for (size_t w = 0; w < turns->n; w++) {
+        const size_t i = (i_direction + N - w * PER_TURN) % N;
+        const double complex shadow =
+            wave_shadow_amplitude(kappa, turns->range[w], remainder(2 * M_PI * (double)i / N, 2 * M_PI));
+        for (size_t pair = 0; pair < WAVE_N_FIELD * WAVE_N_FIELD; pair++) {
+            const bool same = pair / WAVE_N_FIELD == pair % WAVE_N_FIELD;
+            const double complex left = t[pair * turns->n + w] - (same ? shadow : 0);
+            power[i] += turns->weight[w] / WAVE_N_FIELD * (creal(left) * creal(left) + cimag(left) * cimag(left));
         }
     }
 }
 
-static status check_angles(const struct wave_problem *p, struct error *err)
+static status check_angles(const struct oblique_problem *p, struct error *err)
 {
     double farthest = 0;
     for (int i = 0; i < 360; i++)
@@ -44,33 +60,40 @@ static status check_angles(const struct wave_problem *p, struct error *err)
                            farthest, most);
 }
 
-status wave_mean_over_turns(const struct wave_problem *problem, struct wave_mean *mean, struct error *err)
+/* Means over the solved waves. */
+static void take_mean(const struct oblique_solver *s, const struct turns *turns, double kappa, struct wave_mean *mean)
 {
-    struct wave_solver *s = NULL;
-    double angle[N_TURN], range[N_TURN][2], width = 0, absorbed = 0, extinguished = 0, sum = 0;
-    status st = check_angles(problem, err);
-    if (st == STATUS_OK) st = wave_solver_new(problem, &s, err);
-    for (int w = 0; w < N_TURN; w++) {
-        angle[w] = 2 * M_PI * w / N_TURN;
-        wave_outline_extent(problem->outline, angle[w], range[w]);
-        width += range[w][1] - range[w][0];
+    double power[N] = {0}, width = 0, absorbed = 0, extinguished = 0, sum = 0;
+    double complex t[WAVE_N_FIELD * WAVE_N_FIELD * N_TURN];
+    for (size_t w = 0; w < turns->n; w++) {
+        width += turns->weight[w] * (turns->range[w][1] - turns->range[w][0]);
+        for (int field = 0; field < WAVE_N_FIELD; field++) {
+            const double weight = turns->weight[w] / WAVE_N_FIELD;
+            absorbed += weight * oblique_solver_absorption(s, (enum wave_field)field, w);
+            extinguished += weight * oblique_solver_extinction(s, (enum wave_field)field, w);
+        }
     }
-    if (st == STATUS_OK) st = wave_solver_solve(s, angle, N_TURN, err);
-    if (st != STATUS_OK) {
-        wave_solver_free(s);
-        return st;
+    for (size_t j = 0; j < N; j++) {
+        oblique_solver_towards(s, 2 * M_PI * (double)j / N, t);
+        add_direction(turns, j, kappa, t, power);
     }
-    memset(mean, 0, sizeof *mean);
-    for (size_t w = 0; w < N_TURN; w++) {
-        absorbed += wave_solver_absorption(s, w);
-        extinguished += wave_solver_extinction(s, w);
-    }
-    add_amplitudes(s, problem->k, range, mean->density);
-    wave_solver_free(s);
-    for (int i = 0; i < N; i++) sum += 4 / problem->k / N * mean->density[i];
+    for (int i = 0; i < N; i++) sum += 4 / kappa / N * power[i];
     mean->absorbed = absorbed / (sum + absorbed);
     mean->met = (sum + absorbed) / width;
     mean->extinction = extinguished / width;
-    for (int i = 0; i < N; i++) mean->density[i] *= 2 / (M_PI * problem->k * (sum + absorbed));
-    return STATUS_OK;
+    for (int i = 0; i < N; i++) mean->density[i] = (power[i] + power[(N - i) % N]) / (M_PI * kappa * (sum + absorbed));
+}
+
+status wave_mean_over_turns(const struct oblique_problem *problem, struct wave_mean *mean, struct error *err)
+{
+    struct oblique_solver *s = NULL;
+    struct turns turns;
+    status st = check_angles(problem, err);
+    if (st == STATUS_OK) st = oblique_solver_new(problem, &s, err);
+    if (st != STATUS_OK) return st;
+    choose_turns(problem->outline, oblique_solver_is_symmetric(s), &turns);
+    st = oblique_solver_solve(s, turns.angle_rad, turns.n, err);
+    if (st == STATUS_OK) take_mean(s, &turns, problem->k * cos(problem->theta_rad), mean);
+    oblique_solver_free(s);
+    return st;
 }

@@ -35,6 +35,15 @@ void wave_outline_scale(struct wave_outline *o, double factor)
     }
 }
 
+void wave_outline_turn_quarter(struct wave_outline *o)
+{
+    static const double complex turn[4] = {1, I, -1, -I};
+    for (int k = 0; k <= o->n_wave; k++) {
+        o->forward[k] *= -I * turn[k % 4];
+        o->backward[k] *= -I * conj(turn[k % 4]);
+    }
+}
+
 double complex wave_outline_at(const struct wave_outline *o, double t, double complex *first, double complex *second)
 {
     const double complex turn = complex_of(cos(t), sin(t));

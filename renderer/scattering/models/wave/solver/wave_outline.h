@@ -43,6 +43,8 @@ status wave_outline_load(struct wave_outline *o, const char *path, int n_wave, s
 void wave_outline_roughen(struct wave_outline *o, double height_sd, double length, struct rng *rng);
 
 void wave_outline_scale(struct wave_outline *o, double factor);
+/* Turns the outline clockwise by a quarter of a turn, so that t = 0 is where t = pi / 2 was. */
+void wave_outline_turn_quarter(struct wave_outline *o);
 
 /* Place at t, and its first and second derivatives by t when not NULL. */
 double complex wave_outline_at(const struct wave_outline *o, double t, double complex *first, double complex *second);
