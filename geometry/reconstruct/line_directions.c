@@ -10,6 +10,7 @@ enum { N_VOXEL = LINE_DIRECTIONS_BRICK * LINE_DIRECTIONS_BRICK * LINE_DIRECTIONS
 struct give_job {
     const struct segment_bricks *bricks;
     struct direction_volume *d;
+    bool only_compare;
     float *distance2; /* N_VOXEL per thread */
     uint32_t *nearest;
     struct line_directions *sum; /* one per brick */
@@ -41,7 +42,7 @@ static void give_voxel(const struct give_job *job, struct line_directions *sum, 
     }
     sum->angle_deg += angle_to_deg(acos(fmin(1.0, fabs((double)cosine))));
     sum->n_changed++;
-    direction_volume_set(job->d, at, t);
+    if (!job->only_compare) direction_volume_set(job->d, at, t);
 }
 
 static void give_brick(void *context, size_t i_brick, size_t i_thread)
@@ -70,11 +71,10 @@ static void add(const struct line_directions *part, struct line_directions *sum)
     sum->n_kept += part->n_kept;
 }
 
-status line_directions_give(const struct segment_bricks *bricks, struct direction_volume *d, struct thread_pool *pool,
-                            const struct progress *progress, struct line_directions *sum, struct error *err)
+static status run(struct give_job job, struct thread_pool *pool, const struct progress *progress,
+                  struct line_directions *sum, struct error *err)
 {
-    const size_t n_thread = thread_pool_n_thread(pool), n_brick = segment_n_brick(bricks);
-    struct give_job job = {.bricks = bricks, .d = d};
+    const size_t n_thread = thread_pool_n_thread(pool), n_brick = segment_n_brick(job.bricks);
     status s = STATUS_OK;
     job.distance2 = malloc(n_thread * N_VOXEL * sizeof *job.distance2);
     job.nearest = malloc(n_thread * N_VOXEL * sizeof *job.nearest);
@@ -91,4 +91,17 @@ status line_directions_give(const struct segment_bricks *bricks, struct directio
     free(job.nearest);
     free(job.sum);
     return s;
+}
+
+status line_directions_give(const struct segment_bricks *bricks, struct direction_volume *d, struct thread_pool *pool,
+                            const struct progress *progress, struct line_directions *sum, struct error *err)
+{
+    return run((struct give_job){.bricks = bricks, .d = d}, pool, progress, sum, err);
+}
+
+status line_directions_compare(const struct segment_bricks *bricks, struct direction_volume *d,
+                               struct thread_pool *pool, const struct progress *progress, struct line_directions *sum,
+                               struct error *err)
+{
+    return run((struct give_job){.bricks = bricks, .d = d, .only_compare = true}, pool, progress, sum, err);
 }

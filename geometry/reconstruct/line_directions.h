@@ -22,5 +22,9 @@ static inline float line_directions_reach(float radius_voxel) { return 2.0f * ra
  * result does not depend on the number of threads. STATUS_CANCELLED, STATUS_NO_MEMORY. */
 status line_directions_give(const struct segment_bricks *bricks, struct direction_volume *d, struct thread_pool *pool,
                             const struct progress *progress, struct line_directions *sum, struct error *err);
+/* Fills in the same sum and changes nothing. */
+status line_directions_compare(const struct segment_bricks *bricks, struct direction_volume *d,
+                               struct thread_pool *pool, const struct progress *progress, struct line_directions *sum,
+                               struct error *err);
 
 #endif

@@ -118,6 +118,12 @@ status reconstruct_trial(const struct volume *v, const struct fiber_set *f, cons
 status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *d, struct thread_pool *pool,
                             const struct progress *progress, struct reconstruct_report *report, struct error *err);
 
+/* In place of that step: leaves directions and densities as the filter found them. The report states what the step
+ * would have changed (direction_change_mean_deg, dice), and the noise of the filter's directions twice. */
+status reconstruct_keep_directions(const struct fiber_set *f, struct direction_volume *d, struct thread_pool *pool,
+                                   const struct progress *progress, struct reconstruct_report *report,
+                                   struct error *err);
+
 /* Send warnings about everything a user should know about the geometry that does not stop the job. They depend only on
  * the report, so a report read from its file gives the same warnings. f: the fibers in use. */
 void reconstruct_warn_volume(const struct reconstruct_option *o, const struct reconstruct_report *r,

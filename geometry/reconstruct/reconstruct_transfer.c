@@ -112,15 +112,27 @@ static status fill_densities(const struct fiber_set *f, struct direction_volume 
     return s;
 }
 
+static float largest_radius_m(const struct fiber_set *f)
+{
+    float r_max = 0.0f;
+    for (size_t i = 0; i < f->n_fiber; i++) r_max = fmaxf(r_max, f->radius_m[i]);
+    return r_max;
+}
+
+/* Sorts the segments of the fibers into bricks that reach as far as their directions do. */
+static status brick_lines(const struct fiber_set *f, const struct direction_volume *d, struct segment_bricks *bricks,
+                          struct error *err)
+{
+    const float reach = line_directions_reach((float)((double)largest_radius_m(f) / d->voxel_size_m[0]));
+    return segment_bricks_from_fibers(bricks, f, d->n, d->voxel_size_m, LINE_DIRECTIONS_BRICK, reach, err);
+}
+
 status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *d, struct thread_pool *pool,
                             const struct progress *progress, struct reconstruct_report *report, struct error *err)
 {
     struct segment_bricks bricks = {0};
     struct line_directions change;
-    float r_max = 0.0f;
-    for (size_t i = 0; i < f->n_fiber; i++) r_max = fmaxf(r_max, f->radius_m[i]);
-    float reach = line_directions_reach((float)((double)r_max / d->voxel_size_m[0]));
-    status s = segment_bricks_from_fibers(&bricks, f, d->n, d->voxel_size_m, LINE_DIRECTIONS_BRICK, reach, err);
+    status s = brick_lines(f, d, &bricks, err);
     if (s != STATUS_OK) return s;
     s = direction_noise_measure(d, pool, NULL, &report->direction_noise_deg[0], err);
     if (s == STATUS_OK) s = line_directions_give(&bricks, d, pool, progress, &change, err);
@@ -129,5 +141,22 @@ status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *
     if (s == STATUS_OK) s = direction_noise_measure(d, pool, NULL, &report->direction_noise_deg[1], err);
     if (s == STATUS_OK) count_axes(d, report->axis_share);
     segment_bricks_release(&bricks);
-    return s == STATUS_OK ? fill_densities(f, d, r_max, pool, report, err) : s;
+    return s == STATUS_OK ? fill_densities(f, d, largest_radius_m(f), pool, report, err) : s;
+}
+
+status reconstruct_keep_directions(const struct fiber_set *f, struct direction_volume *d, struct thread_pool *pool,
+                                   const struct progress *progress, struct reconstruct_report *report,
+                                   struct error *err)
+{
+    struct segment_bricks bricks = {0};
+    struct line_directions change;
+    status s = brick_lines(f, d, &bricks, err);
+    if (s != STATUS_OK) return s;
+    s = direction_noise_measure(d, pool, NULL, &report->direction_noise_deg[0], err);
+    report->direction_noise_deg[1] = report->direction_noise_deg[0];
+    if (s == STATUS_OK) s = line_directions_compare(&bricks, d, pool, progress, &change, err);
+    if (s == STATUS_OK) state_change(&change, report);
+    if (s == STATUS_OK) count_axes(d, report->axis_share);
+    segment_bricks_release(&bricks);
+    return s;
 }

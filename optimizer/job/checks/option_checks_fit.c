@@ -202,6 +202,39 @@ static status check_deep_paths(const struct job_surface_picture *p, const json_t
                            "'%s' is given, but the picture has no table of view and light: %s", field, why);
 }
 
+/* Returns whether light that is scattered often comes from cells. */
+static bool by_cells(const struct job_surface_picture *p)
+{
+    return p->method == JOB_PICTURE_FAST && (p->visibility_by_tables || p->deep_by_cells);
+}
+
+/* All pictures with light from cells share one table, and others have none. */
+static status check_cells(const struct job_results *results, const json_t *given, size_t i, struct error *err)
+{
+    static const char *const key[2] = {"cell_order", "cell_paths"};
+    const struct job_surface_picture *p = &results->surface_picture[i];
+    char field[64];
+    for (int k = 0; k < 2; k++) {
+        snprintf(field, sizeof field, "pictures[%zu].%s", i, key[k]);
+        if (!by_cells(p)) {
+            if (json_object_get(given, key[k]) == NULL) continue;
+            return error_set_field(err, STATUS_INVALID, field,
+                                   "'%s' is given, but the picture has no light from cells: take the method \"fast\" "
+                                   "with 'deep_light' \"cells\"",
+                                   field);
+        }
+        for (size_t j = 0; j < i; j++) {
+            const struct job_surface_picture *q = &results->surface_picture[j];
+            if (!by_cells(q) || (k == 0 ? p->cell_order == q->cell_order : p->cell_free_paths == q->cell_free_paths))
+                continue;
+            return error_set_field(err, STATUS_INVALID, field,
+                                   "'%s' is another than that of 'pictures[%zu]', whose table of cells it shares",
+                                   field, j);
+        }
+    }
+    return STATUS_OK;
+}
+
 /* Tables of diffusion are made over the job's sheet, which the studio does not have. */
 static status check_studio_method(const struct job_surface_picture *p, size_t i, struct error *err)
 {
@@ -284,6 +317,7 @@ status job_check_pictures(const struct option_value *v, struct error *err)
         if (s == STATUS_OK) s = check_picture(v->section->setup, v->section->fit, v->section->results, i, err);
         if (s == STATUS_OK)
             s = check_deep_paths(&v->section->results->surface_picture[i], json_array_get(v->value, i), i, err);
+        if (s == STATUS_OK) s = check_cells(v->section->results, json_array_get(v->value, i), i, err);
     }
     return s;
 }

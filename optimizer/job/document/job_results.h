@@ -64,6 +64,8 @@ struct job_surface_picture {
     bool filter;                         /* also filtered for the eye (renderer/preview) */
     bool visibility_by_tables;           /* of JOB_PICTURE_FAST */
     bool deep_by_cells;                  /* of JOB_PICTURE_FAST; with visibility_by_tables in any case */
+    size_t cell_order;                   /* of the harmonics of cells */
+    double cell_free_paths;              /* edge of a cell over the mean free path */
     size_t n_deep_path;                  /* that make the table in place of the cells */
     bool speckle;                        /* of single fibers (renderer/scattering/speckle.h) */
     bool field_by_pixel;                 /* near fields become far fields where pixels are as wide as fibers */

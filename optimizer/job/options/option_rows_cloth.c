@@ -191,6 +191,12 @@ const struct job_option option_rows_cloth[] = {
      .standard = "true",
      .meaning = "Yarns and fibers that are cut at a face of the tile are joined to those of the opposite face: a "
                 "smooth warp, then ends within six radii."},
+    {.path = "volume.transfer_directions",
+     .kind = OPTION_BOOL,
+     INTO(scan, transfer_directions),
+     .standard = "true",
+     .meaning = "Whether voxels take directions and densities from the fibers (fabric thesis, 5.6.7). `false` keeps "
+                "the filter's, for comparison."},
     {.path = "volume.unresolved_fibers",
      .kind = OPTION_BOOL,
      INTO(scan, unresolved_fibers),

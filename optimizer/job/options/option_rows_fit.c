@@ -59,11 +59,10 @@ const struct job_option option_rows_fit[] = {
      .id = OPTION_METHOD,
      TEXT_INTO(fit, method),
      .choice_at = job_method_id,
-     .meaning = "`published_sgd.v1` is the published method, for comparison. When no budget is stated it has the "
-                "published one: six runs of 60 iterations, two replicas, 64 x 64 pixels of 64 samples, which is 550 "
-                "times the light paths of `gauss_newton.v1`. It takes no `priors`, no `nuisance`, no `precision` and "
-                "no `texture` of a "
-                "weight above 0."},
+     .meaning = "`published_sgd.v1` is the published method, for comparison, by default with the published budget: "
+                "six runs of 60 iterations, two replicas, 64 x 64 pixels of 64 samples, 550 times the paths of "
+                "`gauss_newton.v1`. It takes no `priors`, no `nuisance`, no `precision` and no `texture` of a weight "
+                "above 0."},
     {.path = "fit.seed",
      .kind = OPTION_LARGE_COUNT,
      INTO(fit, seed),
@@ -182,8 +181,8 @@ const struct job_option option_rows_fit[] = {
      .standard = "false",
      .items = "lower_um and upper_um",
      .allowed = "`true`, `false`, or the range to search: `{\"lower_um\": v, \"upper_um\": v}`",
-     .meaning = "Look for the mean radius of the fibers, too, by up to 11 short fits of the first fiber model before "
-                "the real one, each with 12 % of `path_budget` and at least 21,000 paths a fitted row."},
+     .meaning = "Find the mean radius of the fibers, too, by up to 11 short fits of the first fiber model, each with "
+                "12 % of `path_budget` and at least 21,000 paths a fitted row."},
     {.path = "fit.fit_radius.lower_um",
      .kind = OPTION_NUMBER,
      INTO(fit, radius_lower_um),

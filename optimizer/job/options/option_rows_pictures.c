@@ -109,8 +109,8 @@ const struct job_option option_rows_pictures[] = {
      RANGE(1, 100000),
      .left_out = "`lamp` of the job",
      .meaning = "A spherical Gaussian in place of the job's lamp: light from infinitely far that falls off as "
-                "exp(sharpness (cos - 1)). Its half width is 67 degrees over the root of the sharpness: 10 is soft, "
-                "200 like a lamp of 10 cm at 61 cm."},
+                "exp(sharpness (cos - 1)), with a half width of 67 degrees over its root: 10 is soft, 200 like a lamp "
+                "of 10 cm at 61 cm."},
     {.path = "pictures[].width_mm",
      .kind = OPTION_NUMBER,
      OF_PICTURE(width_mm),
@@ -147,21 +147,32 @@ const struct job_option option_rows_pictures[] = {
      .choice = visibility_names,
      .standard = "\"traced\"",
      .meaning =
-         "Of method `fast`: whether a ray is traced to see if a fiber has the light, or whether tables of what each "
-         "segment sees say so, as published (fabric thesis, section 6.4.1). The tables then hold one hit of a path, "
-         "and take several times as long to make."},
+         "Of method `fast`: whether a ray is traced to see if a fiber has the light, or tables of what each segment "
+         "sees say so, as published (fabric thesis, section 6.4.1), with one hit of a path, and take several times as "
+         "long to make."},
     {.path = "pictures[].deep_light",
      .kind = OPTION_SWITCH,
      OF_PICTURE(deep_by_cells),
      .choice = deep_light_names,
      .standard = "\"directions\"",
      .meaning =
-         "Of method `fast`: where the light comes from that is scattered more than three times. `directions`: from a "
-         "table of view and light for threads along the weft and along the warp that rise, lie level and fall, as "
-         "means "
-         "over the repeat, so that places of like threads do not differ in this light. `cells`: from a table of the "
-         "place where the third hit lies, in spherical harmonics of order 4, which is made faster. With `visibility` "
-         "`tables` it always comes from cells."},
+         "Of method `fast`: the source of light that is scattered more than three times. `directions`: a table of view "
+         "and light for threads along the weft and along the warp that rise, lie level and fall, as means over the "
+         "repeat. `cells`: a table of the place of the third hit, in spherical harmonics, which is made faster; with "
+         "`visibility` `tables` always."},
+    {.path = "pictures[].cell_order",
+     .kind = OPTION_COUNT,
+     OF_PICTURE(cell_order),
+     RANGE(1, 6),
+     .standard = "4",
+     .meaning = "Of light from cells: order of their harmonics, the same in all such pictures."},
+    {.path = "pictures[].cell_paths",
+     .kind = OPTION_NUMBER,
+     OF_PICTURE(cell_free_paths),
+     RANGE(0.25, 16),
+     .unit = "mean free paths",
+     .standard = "2",
+     .meaning = "Edge of these cells. As `cell_order`."},
     {.path = "pictures[].deep_light_paths",
      .kind = OPTION_COUNT,
      OF_PICTURE(n_deep_path),

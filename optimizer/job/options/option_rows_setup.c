@@ -119,9 +119,9 @@ const struct job_option option_rows_setup[] = {
      INTO(setup, environment_file),
      .left_out = "none",
      .allowed = "OpenEXR",
-     .meaning = "An image of the surroundings in latitude and longitude, added to `radiance`. The first row is the "
-                "normal of the cloth, the first column the direction of phi = 0, and phi grows to the right. It does "
-                "not turn with the cloth. Upload it with the role `environment`."},
+     .meaning = "An image of the surroundings in latitude and longitude, added to `radiance`. Its first row is the "
+                "normal of the cloth, its first column phi = 0, and phi grows to the right. It does not turn with the "
+                "cloth. Role: `environment`."},
     {.path = "environment.scale",
      .kind = OPTION_NUMBER,
      INTO(setup, environment_scale),

@@ -69,14 +69,20 @@ static size_t deep_paths(const struct job_results *results, bool studio)
     return n;
 }
 
-/* Paths of a cell; without a picture by cells they only say how far light spreads. */
-static uint32_t cell_paths(const struct job_results *results, bool studio)
+/* The first picture by cells, with which all others agree (option_checks_fit.c); NULL: there is none. */
+static const struct job_surface_picture *of_cells(const struct job_results *results, bool studio)
 {
     for (size_t i = 0; i < results->n_surface_picture; i++) {
         const struct job_surface_picture *p = &results->surface_picture[i];
-        if (is_of(p, studio) && p->method == JOB_PICTURE_FAST && !by_directions(p)) return CELL_PATHS;
+        if (is_of(p, studio) && p->method == JOB_PICTURE_FAST && !by_directions(p)) return p;
     }
-    return SPREAD_PATHS;
+    return NULL;
+}
+
+/* Paths of a cell; without a picture by cells they only say how far light spreads. */
+static uint32_t cell_paths(const struct job_results *results, bool studio)
+{
+    return of_cells(results, studio) != NULL ? CELL_PATHS : SPREAD_PATHS;
 }
 
 /* Filters take the albedo of fibers from the averages. */
@@ -119,12 +125,15 @@ static status get_tables(struct report *report, bool studio, const struct scene 
 {
     const struct job_results *results = report->in.results;
     const struct pipeline_model *model = &report->model[report_best_model(report)];
+    const struct job_surface_picture *cells = of_cells(results, studio);
     const char *name = studio ? "studio" : "fast";
     char path[WORKER_PATH_BYTES], journal[WORKER_PATH_BYTES], relative[64];
     const struct fast_precompute_request q = {.scene = scene,
                                               .model = model->setup->appearance.surface,
                                               .param = model->fit->result.param,
                                               .n_set = model->setup->sets.n_set,
+                                              .order = cells != NULL ? (uint32_t)cells->cell_order : 0,
+                                              .cell_paths = cells != NULL ? cells->cell_free_paths : 0.0,
                                               .n_path = cell_paths(results, studio),
                                               .no_visibility = !wants_visibility(results, studio),
                                               .deep_traced = deep_paths(results, studio) > 0 ? N_TRACED : 0,

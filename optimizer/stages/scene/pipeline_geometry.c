@@ -187,8 +187,10 @@ static status join_seams(const struct directions_input *in, struct directions_ou
 
 status stage_directions(const struct directions_input *in, struct directions_output *out, struct error *err)
 {
-    status s =
-        reconstruct_transfer(&out->fiber, &out->direction, in->tools->pool, &in->tools->progress, &out->geometry, err);
+    status (*const step)(const struct fiber_set *, struct direction_volume *, struct thread_pool *,
+                         const struct progress *, struct reconstruct_report *, struct error *) =
+        in->scan->transfer_directions ? reconstruct_transfer : reconstruct_keep_directions;
+    status s = step(&out->fiber, &out->direction, in->tools->pool, &in->tools->progress, &out->geometry, err);
     if (s == STATUS_OK) drop_unseen(in, out);
     if (s == STATUS_OK) s = join_seams(in, out, err);
     return s == STATUS_OK

@@ -2,6 +2,7 @@
 import json
 import math
 import os
+import struct
 import subprocess
 
 import jsonschema
@@ -153,6 +154,38 @@ def test_a_sheet_of_its_own_has_no_tables(tmp_path):
     p = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=600)
     assert p.returncode == 1
     assert "black sheet of the job" in json.loads((folder / "status.json").read_text())["error"]["text"]
+
+
+CELLS = {"on": "flat", **VIEW, "method": "fast", "deep_light": "cells"}
+
+
+def test_cells_have_an_order_and_an_edge(tmp_path):
+    """The table of cells is made as the document says; its head states order and cells (renderer/fast/fast_tables_file.c)."""
+    made = {}
+    for name, more in (("standard", {}), ("order", {"cell_order": 2}), ("edge", {"cell_paths": 4})):
+        folder = tmp_path / name
+        (folder / "input").mkdir(parents=True)
+        (folder / "job.json").write_text(json.dumps({"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": [{**CELLS, **more}],
+                                                     "fit": {"model": "isotropic.v1", "fixed": {"C": [0.8, 0.5, 0.3]}}}))
+        (folder / "input/cloth.hair").write_bytes(hair(layers=3))
+        run_worker(folder)
+        head = (folder / "work/report/fast.tables").read_bytes()[64:88]
+        made[name] = struct.unpack("<6I", head)
+        assert json.loads((folder / "results/result.json").read_text())["pictures"][0]["method"] == "fast"
+    order = {name: m[0] for name, m in made.items()}
+    cells = {name: m[3:] for name, m in made.items()}
+    assert order == {"standard": 4, "order": 2, "edge": 4}
+    assert cells["order"] == cells["standard"] and math.prod(cells["edge"]) < 0.6 * math.prod(cells["standard"]), cells
+
+
+@pytest.mark.parametrize("pictures, field, words", [
+    ([{**CELLS, "deep_light": "directions", "cell_order": 3}], "pictures[0].cell_order", "no light from cells"),
+    ([CELLS, {**CELLS, "cell_paths": 3}], "pictures[1].cell_paths", "another than"),
+    ([{**CELLS, "cell_order": 7}], "pictures[0].cell_order", "6")])
+def test_cells_are_shared(real, pictures, field, words):
+    document = {"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": pictures,
+                "fit": {"model": "isotropic.v1", "fixed": {"C": [0.8, 0.5, 0.3]}}}
+    assert words in problem(real.post("/v1/jobs", json=document), 422, "invalid", field)["detail"]
 
 
 @pytest.mark.slow

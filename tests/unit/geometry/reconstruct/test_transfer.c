@@ -101,6 +101,34 @@ static void test_transfer(void **state)
     direction_volume_release(&d);
 }
 
+/* Without the step nothing changes, and the report states what it would have changed. */
+static void test_kept_directions(void **state)
+{
+    (void)state;
+    struct fiber_set f;
+    struct direction_volume d, kept;
+    struct reconstruct_report report = {0}, changed = {0};
+    make_fibers(&f);
+    make_directions(&d);
+    make_directions(&kept);
+    assert_int_equal(reconstruct_keep_directions(&f, &kept, NULL, NULL, &report, NULL), STATUS_OK);
+    for (size_t at = 0; at < (size_t)NX * NY * NZ; at++) {
+        float got[3], want[3];
+        direction_volume_get(&kept, at, got);
+        direction_volume_get(&d, at, want);
+        assert_memory_equal(got, want, sizeof got);
+        assert_int_equal(kept.density[at], d.density[at]);
+    }
+    assert_int_equal(reconstruct_transfer(&f, &d, NULL, NULL, &changed, NULL), STATUS_OK);
+    assert_true(report.dice == changed.dice && report.direction_change_mean_deg == changed.direction_change_mean_deg);
+    assert_true(report.direction_noise_deg[0] == changed.direction_noise_deg[0]);
+    assert_true(report.direction_noise_deg[1] == report.direction_noise_deg[0]);
+    assert_true(report.axis_share[0] < changed.axis_share[0]);
+    fiber_set_release(&f);
+    direction_volume_release(&d);
+    direction_volume_release(&kept);
+}
+
 /* In a yarn along x of an unresolved scan one line crosses: its voxels take the yarn's direction, emptied ones stay
  * empty, and a yarn along y that is far away keeps its own direction. In a resolved scan nothing is averaged. */
 static void test_unresolved(void **state)
@@ -138,6 +166,7 @@ static void test_unresolved(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_transfer), cmocka_unit_test(test_unresolved)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_transfer), cmocka_unit_test(test_kept_directions),
+                                       cmocka_unit_test(test_unresolved)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
