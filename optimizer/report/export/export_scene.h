@@ -37,6 +37,9 @@ struct export_scene {
 
 struct export_format {
     bool has_hair; /* hair materials are written (hair_on_cloth.h) */
+    /* Relative RMS difference of the program's renderings of these materials from the materials' definition, as
+     * measured (docs/exports.md). The stated errors contain it. 0: none is known. */
+    double deviation;
     /* *json: an array with one object for each group of fibers, a new reference. */
     status (*write)(struct export_scene *e, json_t **materials, struct error *err);
     /* Paths of a photograph that take as long, after a fit of n_fit_path; NULL: it renders nothing. */

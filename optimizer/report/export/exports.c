@@ -14,6 +14,7 @@
 #include "optimizer/stages/validation/pipeline_discrepancy.h"
 #include "renderer/scene/scene_ray.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -60,14 +61,17 @@ static status write_conversion(const struct export_scene *e, const json_t *json,
 }
 
 /* Adds the errors of the cloth with the materials of a format to its entry. */
-static void state_error(const struct export_scene *e, const struct hair_error *h, json_t *json)
+static void state_error(const struct export_scene *e, const struct hair_error *h, double deviation, json_t *json)
 {
     if (!h->stated) return;
-    json_object_set_new(json, "rel_rms", json_number(h->rel_rms));
-    json_object_set_new(json, "row_rel_rms", json_number(h->row_rel_rms));
+    json_t *rows = json_array();
+    json_object_set_new(json, "rel_rms", json_number(hypot(h->rel_rms, deviation)));
+    json_object_set_new(json, "row_rel_rms", json_number(hypot(h->row_rel_rms, deviation)));
     if (h->row_rel_rms_se > 0.0) json_object_set_new(json, "row_rel_rms_se", json_number(h->row_rel_rms_se));
-    json_object_set_new(json, "row_rel_errors",
-                        json_number_list(h->row_rel_error, e->report->in.job->rows->observation.n, 1.0));
+    for (size_t i = 0; i < e->report->in.job->rows->observation.n; i++)
+        json_array_append_new(rows, json_number(hypot(h->row_rel_error[i], deviation)));
+    json_object_set_new(json, "row_rel_errors", rows);
+    if (deviation > 0.0) json_object_set_new(json, "program_deviation", json_number(deviation));
 }
 
 /* Whether exact.xml takes sections to lie flat that the model saw turn with their fibers. */
@@ -87,13 +91,18 @@ static const char no_sections[] = "exact.xml of the export for Mitsuba takes the
 /* Adds what people need to know of a format with this error to its entry. */
 static void state_warnings(const struct export_scene *e, size_t i, const struct hair_error *h, json_t *json)
 {
+    const double deviation = exports[i].format->deviation;
     json_t *list = json_array();
     if (exports[i].format->has_hair && !h->stated) json_array_append_new(list, json_string(no_hair_error));
-    if (h->stated && h->row_rel_rms > most_row_error)
+    if (h->stated && hypot(h->row_rel_rms, deviation) > most_row_error)
         json_array_append_new(list, json_sprintf("the cloth with these materials differs from this job's renderings by "
                                                  "%.0f %% over its rows",
-                                                 percent * h->row_rel_rms));
+                                                 percent * hypot(h->row_rel_rms, deviation)));
     if (misses_sections(e, i)) json_array_append_new(list, json_string(no_sections));
+    if (h->stated && deviation > 0.0)
+        json_array_append_new(list, json_sprintf("the program's own renderings of these materials are some %.0f %% "
+                                                 "off, which the error contains; other programs are nearer",
+                                                 percent * deviation));
     json_object_set_new(json, "warnings", list);
 }
 
@@ -111,7 +120,7 @@ static status write_format(struct export_scene *e, size_t i, struct error *err)
     if (exports[i].format == &export_mitsuba)
         json_object_set_new(json, "exact", json_boolean(export_mitsuba_is_exact(e)));
     const struct hair_error *error = exports[i].format->has_hair ? &e->hair_error : &e->own_error;
-    state_error(e, error, json);
+    state_error(e, error, exports[i].format->deviation, json);
     state_warnings(e, i, error, json);
     free(e->own_error.row_rel_error);
     e->own_error = (struct hair_error){.stated = false};
