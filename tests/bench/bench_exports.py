@@ -1,12 +1,14 @@
 """How near a scene that a job exports comes to the job's own renderings, when another program renders it: the twelve fits of export_fits.py, every
-row of the fit rendered by Mitsuba 3 (mitsuba_row.py says what it makes of the other formats), the scene for Blender by Blender and the glTF files by
-three.js (gltf_rows.py), where these are installed. Figures are relative RMS errors over the rows, in the measure of fits, beside the error that the job states for the same rows.
+row of the fit rendered by Mitsuba 3 (mitsuba_row.py says what it makes of the other formats), the scene for Blender by Blender and the glTF files
+by three.js (gltf_rows.py), where these are installed. Figures are relative RMS errors over the rows, in the measure of fits, beside the error that
+the job states for the same rows.
 
 What is finished is kept in the folder of each fit: the job, its exports and compared.json. A second run goes on from there, and compares anew only
 what was exported anew. --only and --formats take a part."""
 import argparse
 import csv
 import glob
+import hashlib
 import json
 import os
 import shutil
@@ -18,6 +20,9 @@ import export_fits
 ROOT = export_fits.ROOT
 # name in the figures: format of the job
 SEEN = {"mitsuba": "mitsuba", "mitsuba_plugin": "mitsuba", "pbrt": "pbrt", "usd": "usd", "blender": "blender", "textures": "textures", "gltf": "gltf"}
+# what a comparison depends on; without an entry conversion.json
+SCENE_OF = {"mitsuba": "scene.xml", "mitsuba_plugin": "exact.xml", "pbrt": "cloth.pbrt", "usd": "cloth.usda", "blender": "scene.json"}
+VIEWS_OF = {"textures": "pbrt"}  # an export without rows.csv is seen in the views of another one
 LEAST_LLVM = 15  # Mitsuba renders the plug-ins in minutes without one, in seconds with it
 PX, SPP = 16, 64
 SPP_OF = {"mitsuba_plugin": 256}  # whose error is small, and whose time is that of its compilation
@@ -88,17 +93,15 @@ def read_rows(folder):
 
 
 def compare(arguments, exports, seen):
-    """rel_rms, as in fits: squares over the square of a row's mean over its channels. stated; and rows that no renderer finished."""
+    """rel_rms, as in fits: squares over the square of a row's mean over its channels; and rows that the renderer did not finish."""
     folder = os.path.join(exports, SEEN[seen])
-    ours = read_rows(os.path.join(exports, "mitsuba"))
+    ours = read_rows(os.path.join(exports, VIEWS_OF.get(seen, SEEN[seen])))
     others = {"blender": lambda: by_blender(folder, ours), "gltf": lambda: by_three(os.path.join(arguments.build, "exports-node"), folder, ours)}
     theirs = others.get(seen, lambda: by_mitsuba(arguments.python, seen, folder, ours))()
     for row, rgb in ours.items():
         print(f"{seen}, row {row}: rendered {rgb}, by the other program {theirs.get(row)}", file=sys.stderr)
     square = sum(sum((a - b) ** 2 for a, b in zip(ours[row], rgb)) / max(sum(ours[row]) / 3, 0.02) ** 2 / 3 for row, rgb in theirs.items())
-    with open(os.path.join(folder, "conversion.json"), encoding="utf-8") as f:
-        stated = stated_error(json.load(f), seen, list(ours))
-    return {"rel_rms": (square / len(theirs)) ** 0.5 if theirs else None, "stated": stated, "failed": [r for r in ours if r not in theirs],
+    return {"rel_rms": (square / len(theirs)) ** 0.5 if theirs else None, "failed": [r for r in ours if r not in theirs],
             "rows": {row: [rgb, theirs.get(row)] for row, rgb in ours.items()}}
 
 
@@ -109,22 +112,34 @@ def kept_comparisons(path):
         return json.load(f)
 
 
+def digest(exports, seen):
+    """Of the files that a comparison depends on: the job's renderings, and the scene or the materials."""
+    sha = hashlib.sha256()
+    for name in (os.path.join(VIEWS_OF.get(seen, SEEN[seen]), "rows.csv"), os.path.join(SEEN[seen], SCENE_OF.get(seen, "conversion.json"))):
+        with open(os.path.join(exports, name), "rb") as f:
+            sha.update(f.read())
+    return sha.hexdigest()
+
+
 def compare_fit(arguments, folder, results, wanted):
     """compared.json of the folder, with what was wanted and missing or older than its export."""
     path, exports = os.path.join(folder, "compared.json"), os.path.join(results, "export")
     kept = kept_comparisons(path)
     for seen in wanted:
-        made = os.path.join(exports, SEEN[seen], "conversion.json")
         if seen == "mitsuba_plugin" and not os.path.exists(os.path.join(exports, "mitsuba", "exact.xml")):
             continue
-        when = os.stat(made).st_mtime_ns
-        if kept.get(seen, {}).get("of") == when:
+        compared = digest(exports, seen)
+        if kept.get(seen, {}).get("of") == compared:
             continue
-        kept[seen] = {"of": when, **compare(arguments, exports, seen)}
+        kept[seen] = {"of": compared, **compare(arguments, exports, seen)}
         with open(path + ".new", "w", encoding="utf-8") as f:
             json.dump(kept, f)
         os.replace(path + ".new", path)
-    return {seen: kept[seen] for seen in wanted if seen in kept}
+    found = {seen: kept[seen] for seen in wanted if seen in kept}
+    for seen, comparison in found.items():
+        with open(os.path.join(exports, SEEN[seen], "conversion.json"), encoding="utf-8") as f:
+            comparison["stated"] = stated_error(json.load(f), seen, [int(row) for row in comparison["rows"]])
+    return found
 
 
 def main():
@@ -144,7 +159,8 @@ def main():
     whole = True
     for name in arguments.only.split(","):
         folder = os.path.join(arguments.build, "bench-exports", name)
-        results = export_fits.run_fit(arguments.build, folder, name, list(dict.fromkeys(SEEN.values())))
+        formats = list(dict.fromkeys(form for seen in wanted for form in (VIEWS_OF.get(seen, SEEN[seen]), SEEN[seen])))
+        results = export_fits.run_fit(arguments.build, folder, name, formats)
         for seen, found in compare_fit(arguments, folder, results, wanted).items():
             whole = whole and not found["failed"]
             for key in ("rel_rms", "stated"):
