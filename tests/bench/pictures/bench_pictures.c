@@ -1,6 +1,6 @@
 /* The fast renderer against the path tracer. Prints one JSON object on each line.
  *
- *   pictures.<fabric>.precompute_s, precompute_bytes
+ *   pictures.<fabric>.precompute_cpu_s, precompute_bytes
  *       Processor seconds to make the tables, and the length of their file.
  *   pictures.<fabric>.flat492_rel_rms
  *       Root mean square of the differences between the mean radiances of 492 flat configurations and 3 channels, over
@@ -145,7 +145,7 @@ static void make_tables(struct bench *b)
     if (t->deep.n_traced > 0)
         fprintf(stderr, "%s: noise of deep light %.2f %%\n", b->fabric->name, 100.0 * (double)t->deep.error);
     if (stat(path, &info) != 0) abort();
-    print(b->fabric->name, "precompute_s", seconds, "s", "lower");
+    print(b->fabric->name, "precompute_cpu_s", seconds, "s", "lower");
     print(b->fabric->name, "precompute_bytes", (double)info.st_size, "bytes", "lower");
     if (option.tables == NULL) unlink(path);
 }
@@ -156,7 +156,7 @@ static void make_averages(struct bench *b)
     double start = clock_process_s();
     check(dual_tables_init(&b->averages, b->flat, b->model.surface, b->param, 1, pool, NULL, &err), &err);
     b->dual = (struct dual_option){&b->averages, (float)option.dual, (float)option.dual};
-    print(b->fabric->name, "precompute_s", clock_process_s() - start, "s", "lower");
+    print(b->fabric->name, "precompute_cpu_s", clock_process_s() - start, "s", "lower");
 }
 
 static struct radiance_input input_of(struct bench *b, const struct scene *scene, bool fast)
