@@ -7,16 +7,27 @@
 #include <math.h>
 #include <string.h>
 
-/* Pixels an edge of a field of the coarse grid; rays to each of the two lights from a field. */
-enum { FIELD_PX = 4, FIELD_RAYS = 96, ITERATION_OF_FIELDS = 65531, ITERATION_OF_PIXELS = 65530, REPLICA = 15 };
-enum { MOST_LAYERS = 5 };
+/* Pixels an edge of a field of the coarse grid; rays to each of the two lights from a field. Noise of fields is
+ * smoothed over FIELD_REACH fields to each side, in FIELD_PASSES passes of twice the step of the one before, between
+ * fields that differ by less than noise does. */
+enum {
+    FIELD_PX = 4,
+    FIELD_RAYS = 96,
+    FIELD_REACH = 2,
+    FIELD_PASSES = 2,
+    FIELD_CHANNELS = 4,
+    ITERATION_OF_FIELDS = 65531,
+    ITERATION_OF_PIXELS = 65530,
+    REPLICA = 15
+};
+enum { MOST_LAYERS = 5, COARSE_SIDE = 2 };
 
 struct run {
     const struct ground_request *q;
     const struct progress *progress;
     struct camera camera;
     struct lights lights;
-    struct image light; /* of the fields: radiance of the ground */
+    struct image light; /* of the fields: radiance of the ground, and its variance (green) */
     struct image *im;
 };
 
@@ -80,7 +91,7 @@ static void light_field(const struct run *r, size_t x, size_t y, float rgb[3])
 {
     const struct rng_key key = {r->q->seed, ITERATION_OF_FIELDS, REPLICA, r->q->stream};
     const double xy[2] = {((double)x + 0.5) / (double)r->light.width, ((double)y + 0.5) / (double)r->light.height};
-    double p[3], sum[3] = {0, 0, 0};
+    double p[3], sum[3] = {0, 0, 0}, square[2] = {0, 0}, mean[2] = {0, 0};
     struct rng rng;
     rng_start(&rng, &key, (uint32_t)(y * r->light.width + x), 0);
     if (!meet(r, xy, p)) return;
@@ -95,9 +106,48 @@ static void light_field(const struct run *r, size_t x, size_t y, float rgb[3])
             else
                 add_environment(r, p, u, one);
             for (int c = 0; c < 3; c++) sum[c] += (double)one[c] / FIELD_RAYS;
+            mean[pass] += (double)one[1] / FIELD_RAYS;
+            square[pass] += (double)one[1] * (double)one[1] / FIELD_RAYS;
         }
     }
     for (int c = 0; c < 3; c++) rgb[c] = (float)sum[c];
+    for (int pass = 0; pass < 2; pass++)
+        rgb[3] += (float)(fmax(square[pass] - mean[pass] * mean[pass], 0.0) / FIELD_RAYS);
+}
+
+/* One field of a pass of the smoothing. */
+static void smooth_field(const struct image *from, size_t x, size_t y, size_t step, float out[FIELD_CHANNELS])
+{
+    const float *here = from->pixel + (y * from->width + x) * FIELD_CHANNELS;
+    double sum[3] = {0, 0, 0}, variance = 0, weight = 0;
+    for (int dy = -FIELD_REACH; dy <= FIELD_REACH; dy++)
+        for (int dx = -FIELD_REACH; dx <= FIELD_REACH; dx++) {
+            const long at[2] = {(long)x + dx * (long)step, (long)y + dy * (long)step};
+            if (at[0] < 0 || at[1] < 0 || at[0] >= (long)from->width || at[1] >= (long)from->height) continue;
+            const float *there = from->pixel + ((size_t)at[1] * from->width + (size_t)at[0]) * FIELD_CHANNELS;
+            const double d = (double)(there[1] - here[1]), noise = (double)(here[3] + there[3]);
+            const double w = exp(-0.25 * (dx * dx + dy * dy) - 0.5 * (noise > 0 ? d * d / noise : d == 0 ? 0 : 1e3));
+            for (int c = 0; c < 3; c++) sum[c] += w * (double)there[c];
+            variance += w * w * (double)there[3];
+            weight += w;
+        }
+    for (int c = 0; c < 3; c++) out[c] = (float)(sum[c] / weight);
+    out[3] = (float)(variance / (weight * weight));
+}
+
+static status smooth_fields(struct image *light, struct error *err)
+{
+    struct image from;
+    status s = image_init(&from, light->width, light->height, FIELD_CHANNELS, err);
+    if (s != STATUS_OK) return s;
+    for (size_t pass = 0; pass < FIELD_PASSES; pass++) {
+        memcpy(from.pixel, light->pixel, light->width * light->height * FIELD_CHANNELS * sizeof *light->pixel);
+        for (size_t y = 0; y < light->height; y++)
+            for (size_t x = 0; x < light->width; x++)
+                smooth_field(&from, x, y, (size_t)1 << pass, light->pixel + (y * light->width + x) * FIELD_CHANNELS);
+    }
+    image_release(&from);
+    return STATUS_OK;
 }
 
 static void run_field_row(void *context, size_t y, size_t i_thread)
@@ -105,7 +155,7 @@ static void run_field_row(void *context, size_t y, size_t i_thread)
     (void)i_thread;
     const struct run *r = context;
     for (size_t x = 0; x < r->light.width && !progress_cancelled(r->progress); x++)
-        light_field(r, x, y, r->light.pixel + (y * r->light.width + x) * 3);
+        light_field(r, x, y, r->light.pixel + (y * r->light.width + x) * FIELD_CHANNELS);
 }
 
 /* Linear between the middles of fields. */
@@ -122,10 +172,11 @@ static void light_at(const struct image *light, const double at[2], float rgb[3]
     }
     for (size_t c = 0; c < 3; c++) {
         const float *p = light->pixel + c;
-        const double above = (1 - part[0]) * (double)p[3 * (low[1] * n[0] + low[0])] +
-                             part[0] * (double)p[3 * (low[1] * n[0] + high[0])],
-                     below = (1 - part[0]) * (double)p[3 * (high[1] * n[0] + low[0])] +
-                             part[0] * (double)p[3 * (high[1] * n[0] + high[0])];
+        const size_t k = FIELD_CHANNELS;
+        const double above = (1 - part[0]) * (double)p[k * (low[1] * n[0] + low[0])] +
+                             part[0] * (double)p[k * (low[1] * n[0] + high[0])],
+                     below = (1 - part[0]) * (double)p[k * (high[1] * n[0] + low[0])] +
+                             part[0] * (double)p[k * (high[1] * n[0] + high[0])];
         rgb[c] = (float)((1 - part[1]) * above + part[1] * below);
     }
 }
@@ -137,6 +188,19 @@ static bool sees_ground(const struct run *r, const double xy[2])
     return meet(r, xy, p) && !(camera_ray(&r->camera, r->q->scene, xy, &ray) && scene_occluded(r->q->scene, &ray));
 }
 
+/* The share of a pixel in which the ground is seen, by side x side rays, one in each part of the pixel. */
+static double share_seen(const struct run *r, size_t x, size_t y, size_t side, struct rng *rng)
+{
+    const struct ground_request *q = r->q;
+    size_t n = 0;
+    for (size_t i = 0; i < side * side; i++) {
+        const double xy[2] = {((double)x + ((double)(i % side) + rng_double(rng)) / (double)side) / (double)q->width,
+                              ((double)y + ((double)(i / side) + rng_double(rng)) / (double)side) / (double)q->height};
+        n += sees_ground(r, xy);
+    }
+    return (double)n / (double)(side * side);
+}
+
 static void run_row(void *context, size_t y, size_t i_thread)
 {
     (void)i_thread;
@@ -146,16 +210,12 @@ static void run_row(void *context, size_t y, size_t i_thread)
     for (size_t x = 0; x < q->width && !progress_cancelled(r->progress); x++) {
         const double middle[2] = {((double)x + 0.5) / (double)q->width, ((double)y + 0.5) / (double)q->height};
         struct rng rng;
-        size_t n = 0;
         float *out = r->im->pixel + (y * q->width + x) * r->im->n_channel;
         rng_start(&rng, &key, (uint32_t)(y * q->width + x), 0);
-        for (size_t i = 0; i < q->n_sample; i++) {
-            const double xy[2] = {((double)x + rng_double(&rng)) / (double)q->width,
-                                  ((double)y + rng_double(&rng)) / (double)q->height};
-            n += sees_ground(r, xy);
-        }
+        double seen = share_seen(r, x, y, COARSE_SIDE, &rng);
+        if (seen > 0 && seen < 1) seen = share_seen(r, x, y, q->n_sample, &rng);
         light_at(&r->light, middle, out);
-        for (int c = 0; c < 3; c++) out[c] *= (float)n / (float)q->n_sample;
+        for (int c = 0; c < 3; c++) out[c] *= (float)seen;
     }
 }
 
@@ -181,8 +241,10 @@ status studio_ground_render(const struct ground_request *q, struct thread_pool *
     s = check(&r, err);
     if (s == STATUS_OK) s = image_init(im, q->width, q->height, 6, err);
     if (s == STATUS_OK)
-        s = image_init(&r.light, (q->width + FIELD_PX - 1) / FIELD_PX, (q->height + FIELD_PX - 1) / FIELD_PX, 3, err);
+        s = image_init(&r.light, (q->width + FIELD_PX - 1) / FIELD_PX, (q->height + FIELD_PX - 1) / FIELD_PX,
+                       FIELD_CHANNELS, err);
     if (s == STATUS_OK) s = thread_pool_run(pool, r.light.height, run_field_row, &r, progress);
+    if (s == STATUS_OK) s = smooth_fields(&r.light, err);
     if (s == STATUS_OK) s = thread_pool_run(pool, q->height, run_row, &r, progress);
     if (s == STATUS_OK && progress_cancelled(progress)) s = STATUS_CANCELLED;
     image_release(&r.light);

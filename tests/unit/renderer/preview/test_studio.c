@@ -101,7 +101,7 @@ static void shadows_have_the_light_that_comes_through(void **state)
     const size_t edge = (PX / 2 * PX + PX / 2 + PX / 7) * im[0].n_channel; /* just beside the piece */
     const float *dark = im[0].pixel + edge, *lit = im[1].pixel + edge;
     assert_true(dark[0] < 0.45f && fabsf(dark[0] - dark[2]) < 1e-6f);
-    assert_true(fabsf(lit[0] - 0.5f) < 1e-4f && fabsf(lit[2] - dark[2]) < 1e-6f);
+    assert_true(fabsf(lit[0] - 0.5f) < 1e-4f && fabsf(lit[2] - dark[2]) < 0.02f); /* green guides the smoothing */
     /* a ray through the border and the side above it counts as one through two layers */
     assert_true(lit[1] < 0.5f * (lit[0] + lit[2]) + 1e-4f && lit[1] - lit[2] > 0.9f * (0.5f * (lit[0] - lit[2])));
     for (int k = 0; k < 2; k++) image_release(&im[k]);
