@@ -29,6 +29,7 @@ struct cli_args {
     const char *out_dir;                   /* --out */
     const char *resume_id;                 /* --resume */
     const char *to;                        /* --to: formats of an export */
+    const char *texture_cm, *texture_px;   /* numbers of exported textures */
     const char *id_file;                   /* --id-file */
     const char *names, *weave;             /* --names: of photographs; --weave: of a cloth without a scan */
     const char *require;                   /* --require: the worst verdict that is accepted */

@@ -56,6 +56,10 @@ const struct cli_option cli_option_table[CLI_N_OPTION] = {
 #undef PICTURE_OPTION
     {NULL, 0, "to", "FORMAT", "mitsuba, pbrt, usd, blender, textures, gltf, pdf (the report), several between commas",
      offsetof(struct cli_args, to)},
+    {NULL, 0, "texture-cm", "CM", "edge of exported textures, 2 to 20 (default: 2)",
+     offsetof(struct cli_args, texture_cm)},
+    {NULL, 0, "texture-px", "N", "most pixels of their longer edge, up to 4096 (default: 2048)",
+     offsetof(struct cli_args, texture_px)},
     {NULL, 0, "revoke", NULL, "end all links of the job", offsetof(struct cli_args, revoke)},
     {NULL, 0, "links", NULL, "list the links that are valid", offsetof(struct cli_args, links)},
     {NULL, 0, "template", "JOB.json",

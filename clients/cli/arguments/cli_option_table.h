@@ -23,7 +23,7 @@ enum {
 #include "clients/cli/arguments/picture_options.def"
 #undef PICTURE_OPTION
     ,
-    CLI_N_OPTION = 52 + CLI_N_PICTURE_OPTION
+    CLI_N_OPTION = 54 + CLI_N_PICTURE_OPTION
 };
 extern const struct cli_option cli_option_table[CLI_N_OPTION];
 

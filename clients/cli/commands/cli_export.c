@@ -1,6 +1,8 @@
 /* selvedge export and selvedge twin: files for other programs, and the twin for a browser, of a finished job. */
 #include "clients/cli/commands/cli_derive.h"
 
+#include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
@@ -34,6 +36,19 @@ static status read_formats(const char *text, json_t **formats, struct error *err
     return STATUS_OK;
 }
 
+/* Adds a number of the command line to the section, for the checks of the job document. */
+static status add_number(json_t *section, const char *key, const char *option, const char *text, struct error *err)
+{
+    char *end;
+    if (text == NULL) return STATUS_OK;
+    const double value = strtod(text, &end);
+    if (end == text || *end != '\0')
+        return error_set(err, STATUS_INVALID, "option '%s' takes a number: '%s'", option, text);
+    const bool is_whole = value == floor(value) && fabs(value) < 1e9;
+    json_object_set_new(section, key, is_whole ? json_integer((json_int_t)value) : json_real(value));
+    return STATUS_OK;
+}
+
 /* The PDF lies beside the folder of exports, which is not there without another format. */
 static bool only_pdf(const json_t *wanted)
 {
@@ -59,7 +74,7 @@ static status make_and_fetch(struct cli *cli, const char *text, const json_t *wa
 
 CLI_COMMAND(
     EXPORT, cli_export, .place = 42, .name = "export", .operand = "ID|FOLDER",
-    .needs = "a job id, or a folder of downloaded results", .options = "to out id-file",
+    .needs = "a job id, or a folder of downloaded results", .options = "to texture-cm texture-px out id-file",
     .summary = "the cloth of a finished job for other programs, without a new fit",
     .text =
         "A job of its own writes the files, which go to export/FORMAT in the folder of --out (default: selvedge-ID).\n"
@@ -69,6 +84,8 @@ status cli_export(struct cli *cli, int *exit_code, struct error *err)
 {
     json_t *formats = NULL;
     status s = read_formats(cli->args->to, &formats, err);
+    if (s == STATUS_OK) s = add_number(formats, "texture_cm", "--texture-cm", cli->args->texture_cm, err);
+    if (s == STATUS_OK) s = add_number(formats, "texture_px", "--texture-px", cli->args->texture_px, err);
     json_t *wanted = json_pack("{s:o}", "export", formats != NULL ? formats : json_object());
     const char *from = cli->args->operand, *to = cli->args->out_dir != NULL ? cli->args->out_dir : from;
     if (s == STATUS_OK)

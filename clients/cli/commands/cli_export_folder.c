@@ -106,6 +106,7 @@ static status move_exports(struct cli *cli, const json_t *formats, const char *j
     json_object_foreach((json_t *)formats, format, value)
     {
         if (s != STATUS_OK) break;
+        if (!json_is_true(value)) continue; /* a number of a format */
         const bool pdf = strcmp(format, "pdf") == 0;
         snprintf(from, sizeof from, "%.4000s/results/%s%.40s", job, pdf ? "report." : "export/", format);
         snprintf(target, sizeof target, "%.4000s/%s%.40s", pdf ? to : parent, pdf ? "report." : "", format);

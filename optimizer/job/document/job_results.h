@@ -80,6 +80,8 @@ struct job_results {
     bool twin; /* tables for the page in the browser */
     size_t twin_paths, twin_texels;
     bool exported[JOB_MAX_EXPORT]; /* in the order of the rows EXPORT */
+    double texture_cm;             /* edge of exported textures, of which a whole number of tiles is nearest */
+    size_t texture_px;             /* most pixels of their longer side */
     bool export_pdf;
     char report_file[JOB_MAX_NAME_BYTES]; /* report.html of another job, in place of the job's own; "": none */
 };

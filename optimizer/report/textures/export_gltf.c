@@ -10,6 +10,8 @@
 
 static const double mm = 1e3, percent = 100.0, most_error = 0.1;
 
+enum { TILE_PX = 256 }; /* of the tile's longer edge */
+
 struct gltf {
     struct export_scene *e;
     struct texture_tile tile;
@@ -84,15 +86,16 @@ static status write_files(const struct gltf *f, struct error *err)
 static json_t *materials_json(const struct gltf *f)
 {
     const struct gltf_surface *g = &f->surface;
-    return json_pack(
-        "[{s:n, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}]", "group", "f0",
-        json_number_list(g->f0, 3, 1.0), "f90", json_number(g->f90), "roughness", json_number(g->roughness),
-        "anisotropy", json_number(g->anisotropy), "anisotropy_rotation", json_number(g->rotation_rad), "base_color",
-        json_number_list(g->base, 3, 1.0), "sheen_color", json_number_list(g->sheen, 3, 1.0), "sheen_roughness",
-        json_number(g->sheen_roughness), "coat", json_number(g->coat), "coat_roughness", json_number(g->coat_roughness),
-        "transmission", json_number_list(g->means.transmission, 3, 1.0), "pixel_rel_se", json_number(f->tile.noise),
-        "normal_scale", json_number(g->normal_scale), "afar_rel_rms", json_number(g->error.afar_rel_rms), "rel_rms",
-        json_number(g->error.rel_rms), "heldout_rel_rms", json_number(g->error.heldout_rel_rms));
+    return json_pack("[{s:n, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}]", "group",
+                     "f0", json_number_list(g->f0, 3, 1.0), "f90", json_number(g->f90), "roughness",
+                     json_number(g->roughness), "anisotropy", json_number(g->anisotropy), "anisotropy_rotation",
+                     json_number(g->rotation_rad), "base_color", json_number_list(g->base, 3, 1.0), "sheen_color",
+                     json_number_list(g->sheen, 3, 1.0), "sheen_roughness", json_number(g->sheen_roughness), "coat",
+                     json_number(g->coat), "coat_roughness", json_number(g->coat_roughness), "transmission",
+                     json_number_list(g->means.transmission, 3, 1.0), "pixel_rel_se",
+                     json_number(f->tile.noise[0].rel_se), "normal_scale", json_number(g->normal_scale), "afar_rel_rms",
+                     json_number(g->error.afar_rel_rms), "rel_rms", json_number(g->error.rel_rms), "heldout_rel_rms",
+                     json_number(g->error.heldout_rel_rms));
 }
 
 /* The scene owns the errors of rows then. */
@@ -115,7 +118,8 @@ static status write_gltf(struct export_scene *e, json_t **materials, struct erro
     struct gltf f = {.e = e};
     struct texture_target target = {0};
     for (size_t a = 0; a < 2; a++) f.tile_mm[a] = mm * e->report->in.made->fiber.tile_size_m[a];
-    status s = texture_tile_make(e, &f.tile, err);
+    const struct texture_size size = texture_size_of(f.tile_mm, 0.0, TILE_PX);
+    status s = texture_tile_make(e, size.tile_px, &f.tile, err);
     f.surface.maps = &f.tile.maps;
     f.surface.means = f.tile.means;
     if (s == STATUS_OK) s = texture_target_make(e, TEXTURE_TILE_SHARE, 1.0, &target, err);

@@ -5,9 +5,11 @@
  * cloth.mtlx and cloth.u3m (texture_documents.h). Of the parameters, texture_surface.h. */
 #include "base/files/durable.h"
 #include "optimizer/job/document/json_number.h"
+#include "optimizer/job/job_folder.h"
 #include "optimizer/report/export/export_scene.h"
 #include "optimizer/report/textures/texture_documents.h"
 #include "optimizer/report/textures/texture_tile.h"
+#include "optimizer/report/textures/u3ma_file.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 
 #include <math.h>
@@ -16,7 +18,20 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { N_CHANNEL = 18 };
+/* Channels of maps.exr. */
+enum {
+    BASE,
+    TRANSMISSION = 3,
+    NORMAL = 6,
+    ROUGHNESS = 9,
+    ANISOTROPY,
+    DIRECTION,
+    HEIGHT,
+    PRINCIPLED_BASE,
+    PRINCIPLED_ROUGHNESS = 16,
+    PRINCIPLED_ANISOTROPY,
+    N_CHANNEL
+};
 static const double percent = 100.0, most_row_error = 0.1; /* of a cloth that is exported without a warning */
 static const char *const channel[N_CHANNEL] = {"R",
                                                "G",
@@ -46,29 +61,47 @@ struct textures {
 
 /* ---- files ---- */
 
-enum picture_kind { PICTURE_SRGB, PICTURE_NUMBERS, PICTURE_EXR };
-
-static status write_picture(const struct textures *t, const struct image *im, const char *name, enum picture_kind kind,
-                            struct error *err)
+/* Gives a part file that was written as `partial` its name. */
+static status publish(const struct textures *t, status s, const char *part, const char *path, struct error *err)
 {
-    char path[WORKER_PATH_BYTES], part[WORKER_PATH_BYTES], partial[64];
-    snprintf(partial, sizeof partial, "part-%s", name);
-    export_path(t->e, name, path);
-    export_path(t->e, partial, part);
-    status s = STATUS_OK;
-    if (kind == PICTURE_SRGB) s = image_write_png(im, 1.0, part, err);
-    if (kind == PICTURE_EXR) s = image_write_exr(im, part, err);
-    if (kind == PICTURE_NUMBERS) {
-        uint8_t *rgb = malloc(3 * im->width * im->height);
-        if (rgb == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write textures: out of memory");
-        for (size_t i = 0; i < 3 * im->width * im->height; i++)
-            rgb[i] = (uint8_t)lround(255.0 * fmin(fmax((double)im->pixel[i], 0.0), 1.0));
-        s = image_write_png_rgb8(rgb, im->width, im->height, part, err);
-        free(rgb);
-    }
     if (s == STATUS_OK) s = worker_folder_check(t->e->report->in.job->tools->folder, err);
     if (s == STATUS_OK) return durable_rename(part, path, err);
     unlink(part);
+    return s;
+}
+
+static void paths_of(const struct textures *t, const char *name, char path[WORKER_PATH_BYTES],
+                     char part[WORKER_PATH_BYTES])
+{
+    char partial[64];
+    snprintf(partial, sizeof partial, "part-%s", name);
+    export_path(t->e, name, path);
+    export_path(t->e, partial, part);
+}
+
+/* All maps of one tile as floats. */
+static status write_exr(const struct textures *t, const struct image *all, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], part[WORKER_PATH_BYTES];
+    paths_of(t, "maps.exr", path, part);
+    return publish(t, image_write_exr(all, part, err), part, path, err);
+}
+
+/* Writes a PNG of the texture: rows of tiles of 3 bytes a pixel. */
+static status write_repeated(const struct textures *t, const uint8_t *tile, const char *name, struct error *err)
+{
+    const struct texture_maps *m = &t->tile.maps;
+    const size_t row = 3 * m->width, width = m->width * t->tile.maps.repeat[0],
+                 height = m->height * t->tile.maps.repeat[1];
+    char path[WORKER_PATH_BYTES], part[WORKER_PATH_BYTES];
+    uint8_t *rgb = malloc(3 * width * height);
+    if (rgb == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write textures: out of memory");
+    for (size_t j = 0; j < height; j++)
+        for (size_t k = 0; k < t->tile.maps.repeat[0]; k++)
+            memcpy(rgb + 3 * j * width + k * row, tile + j % m->height * row, row);
+    paths_of(t, name, path, part);
+    status s = publish(t, image_write_png_rgb8(rgb, width, height, part, err), part, path, err);
+    free(rgb);
     return s;
 }
 
@@ -78,17 +111,17 @@ static void pixel_of(const struct textures *t, size_t i, float out[N_CHANNEL])
     for (size_t c = 0; c < 3; c++) {
         /* in proportion, so that the mean is right in spite of the noise of dark pixels */
         const double share = (double)t->tile.reflected.pixel[3 * i + c] / fmax(t->tile.means.albedo[c], 1e-9);
-        out[c] = (float)(share * t->surface.base[c]);
-        out[3 + c] = t->tile.transmitted.pixel[3 * i + c];
-        out[6 + c] = t->tile.maps.normal[3 * i + c];
-        out[13 + c] = (float)(share * t->principled.base[c]);
+        out[BASE + c] = (float)(share * t->surface.base[c]);
+        out[TRANSMISSION + c] = t->tile.transmitted.pixel[3 * i + c];
+        out[NORMAL + c] = t->tile.maps.normal[3 * i + c];
+        out[PRINCIPLED_BASE + c] = (float)(share * t->principled.base[c]);
     }
-    out[9] = (float)texture_surface_roughness(&t->surface, i);
-    out[10] = (float)texture_surface_anisotropy(&t->surface, i);
-    out[16] = (float)texture_principled_roughness(&t->principled, i);
-    out[17] = (float)texture_principled_anisotropy(&t->principled, i);
-    out[11] = t->tile.maps.direction_rad[i];
-    out[12] = t->tile.maps.height_mm[i];
+    out[ROUGHNESS] = (float)texture_surface_roughness(&t->surface, i);
+    out[ANISOTROPY] = (float)texture_surface_anisotropy(&t->surface, i);
+    out[PRINCIPLED_ROUGHNESS] = (float)texture_principled_roughness(&t->principled, i);
+    out[PRINCIPLED_ANISOTROPY] = (float)texture_principled_anisotropy(&t->principled, i);
+    out[DIRECTION] = t->tile.maps.direction_rad[i];
+    out[HEIGHT] = t->tile.maps.height_mm[i];
 }
 
 /* Turns from +x to the direction across the fibers, which has no sign: in [0.125, 0.625), so that the angles of weft
@@ -99,23 +132,70 @@ static float rotation_turns(float direction_rad)
     return (float)(turns >= 0.625 ? turns - 0.5 : turns);
 }
 
-/* One PNG of channels [first, first + n) as numbers of [0, 1]; one channel becomes grey. */
+static uint8_t byte_of(float value) { return (uint8_t)lround(255.0 * fmin(fmax((double)value, 0.0), 1.0)); }
+
+/* One PNG of channels [first, first + n): colors by the curve of sRGB, others as numbers of [0, 1]; one channel becomes
+ * grey. */
 static status write_map(const struct textures *t, const struct image *all, size_t first, size_t n, const char *name,
                         struct error *err)
 {
-    struct image im;
-    status s = image_init(&im, all->width, all->height, 3, err);
-    if (s != STATUS_OK) return s;
-    for (size_t i = 0; i < im.width * im.height; i++)
-        for (size_t c = 0; c < 3; c++) {
-            float value = all->pixel[i * N_CHANNEL + first + (n == 3 ? c : 0)];
-            if (first == 6) value = 0.5f * (value + 1.0f);
-            if (first == 11) value = rotation_turns(value);
-            im.pixel[3 * i + c] = value;
-        }
-    s = write_picture(t, &im, name, first < 6 || first == 13 ? PICTURE_SRGB : PICTURE_NUMBERS, err);
-    image_release(&im);
+    const bool is_color = first < NORMAL || first == PRINCIPLED_BASE;
+    const size_t n_px = all->width * all->height;
+    uint8_t *tile = malloc(3 * n_px);
+    if (tile == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write textures: out of memory");
+    for (size_t i = 0; i < 3 * n_px; i++) {
+        float value = all->pixel[i / 3 * N_CHANNEL + first + (n == 3 ? i % 3 : 0)];
+        if (first == NORMAL) value = 0.5f * (value + 1.0f);
+        if (first == DIRECTION) value = rotation_turns(value);
+        if (first == HEIGHT) value = 1.0f + value / (float)texture_height_range_mm(t->e);
+        tile[i] = is_color ? image_srgb_byte((double)value) : byte_of(value);
+    }
+    status s = write_repeated(t, tile, name, err);
+    free(tile);
     return s;
+}
+
+/* The U3M material from straight above, in the light of a lamp on the upper left and in even light. */
+static status write_preview(const struct textures *t, struct error *err)
+{
+    static const double wi[3] = {-0.5, 0.5, M_SQRT1_2}, wo[3] = {0.0, 0.0, 1.0};
+    const struct texture_maps *m = &t->tile.maps;
+    size_t size[2];
+    texture_preview_size(m, size);
+    char path[WORKER_PATH_BYTES], part[WORKER_PATH_BYTES];
+    uint8_t *rgb = malloc(3 * size[0] * size[1]);
+    if (rgb == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write textures: out of memory");
+    for (size_t k = 0; k < size[0] * size[1]; k++) {
+        const size_t i = k / size[0] % m->height * m->width + k % size[0] % m->width;
+        const struct texture_sample s = texture_pixel_sample(m, i, t->principled.normal_scale);
+        double lit[3];
+        texture_principled_reflect(&t->principled, &s, wi, wo, lit);
+        for (size_t c = 0; c < 3; c++)
+            rgb[3 * k + c] = image_srgb_byte(0.7 * lit[c] + 0.3 * (double)t->tile.reflected.pixel[3 * i + c]);
+    }
+    paths_of(t, "preview.png", path, part);
+    status s = publish(t, image_write_png_rgb8(rgb, size[0], size[1], part, err), part, path, err);
+    free(rgb);
+    return s;
+}
+
+/* cloth.u3ma: the U3M material with the pictures that it names. */
+static status write_archive(const struct textures *t, struct error *err)
+{
+    static const char *const name[] = {"cloth.u3m",
+                                       "preview.png",
+                                       "principled_base_color.png",
+                                       "normal.png",
+                                       "principled_roughness.png",
+                                       "principled_anisotropy.png",
+                                       "anisotropy_rotation.png",
+                                       "transmission.png",
+                                       "height.png"};
+    char path[WORKER_PATH_BYTES], part[WORKER_PATH_BYTES], folder[WORKER_PATH_BYTES];
+    worker_folder_path(t->e->report->in.job->tools->folder, JOB_FOLDER_RESULTS, t->e->folder, folder);
+    paths_of(t, "cloth.u3ma", path, part);
+    return publish(t, u3ma_file_write(part, folder, name, sizeof name / sizeof *name, time(NULL), err), part, path,
+                   err);
 }
 
 static status write_maps(const struct textures *t, struct error *err)
@@ -123,21 +203,22 @@ static status write_maps(const struct textures *t, struct error *err)
     static const struct {
         size_t first, n;
         const char *name;
-    } map[] = {{0, 3, "base_color.png"},
-               {3, 3, "transmission.png"},
-               {6, 3, "normal.png"},
-               {9, 1, "roughness.png"},
-               {10, 1, "anisotropy.png"},
-               {11, 1, "anisotropy_rotation.png"},
-               {13, 3, "principled_base_color.png"},
-               {16, 1, "principled_roughness.png"},
-               {17, 1, "principled_anisotropy.png"}};
+    } map[] = {{BASE, 3, "base_color.png"},
+               {TRANSMISSION, 3, "transmission.png"},
+               {NORMAL, 3, "normal.png"},
+               {ROUGHNESS, 1, "roughness.png"},
+               {ANISOTROPY, 1, "anisotropy.png"},
+               {DIRECTION, 1, "anisotropy_rotation.png"},
+               {PRINCIPLED_BASE, 3, "principled_base_color.png"},
+               {PRINCIPLED_ROUGHNESS, 1, "principled_roughness.png"},
+               {PRINCIPLED_ANISOTROPY, 1, "principled_anisotropy.png"},
+               {HEIGHT, 1, "height.png"}};
     struct image all;
     status s = image_init(&all, t->tile.maps.width, t->tile.maps.height, N_CHANNEL, err);
     if (s != STATUS_OK) return s;
     all.channel_name = channel;
     for (size_t i = 0; i < all.width * all.height; i++) pixel_of(t, i, all.pixel + i * N_CHANNEL);
-    s = write_picture(t, &all, "maps.exr", PICTURE_EXR, err);
+    s = write_exr(t, &all, err);
     for (size_t i = 0; i < sizeof map / sizeof map[0] && s == STATUS_OK; i++)
         s = write_map(t, &all, map[i].first, map[i].n, map[i].name, err);
     image_release(&all);
@@ -175,19 +256,34 @@ static json_t *open_pbr_json(const struct texture_surface *u)
                      "normal_scale", json_number(u->normal_scale));
 }
 
+static void put_size(const struct textures *t, json_t *json)
+{
+    const struct texture_maps *m = &t->tile.maps;
+    const size_t *repeat = t->tile.maps.repeat;
+    json_object_set_new(json, "repeats", json_pack("[I, I]", (json_int_t)repeat[0], (json_int_t)repeat[1]));
+    json_object_set_new(json, "size_px",
+                        json_pack("[I, I]", (json_int_t)(repeat[0] * m->width), (json_int_t)(repeat[1] * m->height)));
+    json_object_set_new(json, "size_mm",
+                        json_pack("[f, f]", (double)(repeat[0] * m->width) * m->pixel_mm[0],
+                                  (double)(repeat[1] * m->height) * m->pixel_mm[1]));
+    json_object_set_new(json, "smoothing_um", json_number(1e3 * t->tile.noise[0].smooth_mm));
+}
+
 static json_t *material_json(const struct textures *t)
 {
     const size_t n_row = t->e->report->in.job->rows->observation.n;
     json_t *json = open_pbr_json(&t->surface);
     json_object_set_new(json, "albedo", json_number_list(t->tile.means.albedo, 3, 1.0));
     json_object_set_new(json, "transmission", json_number_list(t->tile.means.transmission, 3, 1.0));
-    json_object_set_new(json, "pixel_rel_se", json_number(t->tile.noise));
+    json_object_set_new(json, "pixel_rel_se", json_number(t->tile.noise[0].rel_se));
+    json_object_set_new(json, "transmission_pixel_rel_se", json_number(t->tile.noise[1].rel_se));
+    put_size(t, json);
     put_error(json, &t->surface.error, n_row);
     json_object_set_new(json, "principled", principled_json(&t->principled, n_row));
     return json_pack("[o]", json);
 }
 
-/* The error of the export is that of its U3M material, whose model is the smaller one. */
+/* States the error of the U3M material, whose model is the smaller one, as the error of the export. */
 static void state_error(struct textures *t)
 {
     struct texture_error *error = &t->principled.error;
@@ -221,11 +317,15 @@ static status fit_surfaces(struct textures *t, struct error *err)
 static status write_textures(struct export_scene *e, json_t **materials, struct error *err)
 {
     struct textures t = {.e = e};
-    status s = texture_tile_make(e, &t.tile, err);
+    const struct texture_size size = texture_size_wanted(e);
+    status s = texture_tile_make(e, size.tile_px, &t.tile, err);
+    memcpy(t.tile.maps.repeat, size.repeat, sizeof size.repeat);
     if (s == STATUS_OK) s = fit_surfaces(&t, err);
     if (s == STATUS_OK) s = write_maps(&t, err);
     if (s == STATUS_OK) s = texture_materialx_write(e, &t.surface, err);
+    if (s == STATUS_OK) s = write_preview(&t, err);
     if (s == STATUS_OK) s = texture_u3m_write(e, &t.principled, err);
+    if (s == STATUS_OK) s = write_archive(&t, err);
     if (s == STATUS_OK) {
         *materials = material_json(&t);
         state_error(&t);

@@ -1,5 +1,6 @@
 #include "optimizer/report/textures/texture_documents.h"
 
+#include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/json_number.h"
 
 #include <math.h>
@@ -108,7 +109,8 @@ static void print_numbers(FILE *text, const struct texture_surface *t)
 status texture_materialx_write(const struct export_scene *e, const struct texture_surface *t, struct error *err)
 {
     const struct texture_maps *m = t->maps;
-    const double size_mm[2] = {m->pixel_mm[0] * (double)m->width, m->pixel_mm[1] * (double)m->height};
+    const double size_mm[2] = {m->pixel_mm[0] * (double)(m->repeat[0] * m->width),
+                               m->pixel_mm[1] * (double)(m->repeat[1] * m->height)};
     struct export_text text;
     status s = export_text_open(&text, err);
     if (s != STATUS_OK) return s;
@@ -137,10 +139,30 @@ status texture_materialx_write(const struct export_scene *e, const struct textur
 
 /* ---- U3M ---- */
 
+enum { PREVIEW_PX = 512 };
+
+double texture_height_range_mm(const struct export_scene *e) { return 1e3 * fmax(e->z_high_m - e->z_low_m, 1e-9); }
+
+void texture_preview_size(const struct texture_maps *m, size_t size[2])
+{
+    const size_t whole[2] = {m->width * m->repeat[0], m->height * m->repeat[1]};
+    for (int a = 0; a < 2; a++) size[a] = whole[a] < PREVIEW_PX ? whole[a] : PREVIEW_PX;
+}
+
+static json_t *preview_json(const struct texture_maps *m)
+{
+    size_t size[2];
+    texture_preview_size(m, size);
+    return json_pack("{s:f, s:f, s:{s:f, s:f}, s:s}", "width", m->pixel_mm[0] * (double)size[0], "height",
+                     m->pixel_mm[1] * (double)size[1], "dpi", "x", mm_per_inch / m->pixel_mm[0], "y",
+                     mm_per_inch / m->pixel_mm[1], "path", "preview.png");
+}
+
 static json_t *image_json(const struct texture_maps *m, const char *file)
 {
-    return json_pack("{s:f, s:f, s:{s:f, s:f}, s:s, s:{s:f, s:s}}", "width", m->pixel_mm[0] * (double)m->width,
-                     "height", m->pixel_mm[1] * (double)m->height, "dpi", "x", mm_per_inch / m->pixel_mm[0], "y",
+    return json_pack("{s:f, s:f, s:{s:f, s:f}, s:s, s:{s:f, s:s}}", "width",
+                     m->pixel_mm[0] * (double)(m->repeat[0] * m->width), "height",
+                     m->pixel_mm[1] * (double)(m->repeat[1] * m->height), "dpi", "x", mm_per_inch / m->pixel_mm[0], "y",
                      mm_per_inch / m->pixel_mm[1], "path", file, "repeat", "rotation", 0.0, "mode", "normal");
 }
 
@@ -175,7 +197,7 @@ static json_t *normal_json(const struct texture_maps *m, const char *file, doubl
 /* Sets the keys without a map to the values of a plain dielectric without coat and metal. */
 static void add_rest(json_t *v)
 {
-    static const char *const zero[] = {"clearcoat_value", "clearcoat_roughness", "metalness",       "displacement",
+    static const char *const zero[] = {"clearcoat_value", "clearcoat_roughness", "metalness",
                                        "specular_tint",   "subsurface_radius",   "subsurface_value"};
     static const double white[3] = {1.0, 1.0, 1.0};
     for (size_t i = 0; i < sizeof zero / sizeof zero[0]; i++) json_object_set_new(v, zero[i], number_json(0.0));
@@ -184,7 +206,6 @@ static void add_rest(json_t *v)
     json_object_set_new(v, "clearcoat_normal", normal_json(NULL, NULL, 1.0));
     json_object_set_new(v, "subsurface_color", json_pack("{s:o, s:n}", "constant", rgb_json(white), "texture"));
     json_object_set_new(v, "shader", json_string("principled"));
-    json_object_set_new(v, "preview", json_null());
 }
 
 static double mean_of(const struct texture_principled *p, double (*value)(const struct texture_principled *, size_t))
@@ -195,7 +216,16 @@ static double mean_of(const struct texture_principled *p, double (*value)(const 
     return sum / (double)n;
 }
 
-static json_t *front_json(const struct texture_principled *p)
+static double mean_height_mm(const struct export_scene *e, const struct texture_maps *m)
+{
+    double sum = 0.0;
+    const size_t n = m->width * m->height;
+    for (size_t i = 0; i < n; i++) sum += (double)m->height_mm[i];
+    return sum / (double)n + texture_height_range_mm(e);
+}
+
+/* Heights are millimetres above the lowest place. */
+static json_t *front_json(const struct export_scene *e, const struct texture_principled *p)
 {
     const struct texture_maps *m = p->maps;
     const double *through = p->means.transmission;
@@ -212,10 +242,29 @@ static json_t *front_json(const struct texture_principled *p)
     json_object_set_new(
         v, "transmission",
         number_map_json(fmin((through[0] + through[1] + through[2]) / 3.0, 1.0), 1.0, m, "transmission.png"));
+    json_object_set_new(v, "displacement",
+                        number_map_json(mean_height_mm(e, m), texture_height_range_mm(e), m, "height.png"));
+    json_object_set_new(v, "preview", preview_json(m));
     json_object_set_new(v, "specular_value", number_json(p->specular));
     json_object_set_new(v, "sheen_value", number_json(p->sheen));
     json_object_set_new(v, "sheen_tint", number_json(p->sheen_tint));
     return v;
+}
+
+/* A word of U3M's list for a described cloth, which is woven; null for other cloths, which may be knitted. */
+static json_t *woven_json(const struct export_scene *e)
+{
+    const struct job_cloth *cloth = e->report->in.job->cloth;
+    return cloth->description != NULL ? json_pack("{s:s, s:n}", "type", "Woven", "name") : json_null();
+}
+
+static json_t *construction_json(const struct export_scene *e)
+{
+    static const char *const word[][2] = {{"plain", "Plain weave"}, {"twill", "Twill"}, {"satin", "Satin"}};
+    const struct job_cloth *cloth = e->report->in.job->cloth;
+    for (size_t i = 0; i < sizeof word / sizeof *word; i++)
+        if (strcmp(cloth->weave, word[i][0]) == 0) return json_pack("{s:s, s:n}", "type", word[i][1], "name");
+    return cloth->weave[0] != '\0' ? json_pack("{s:s, s:s}", "type", "other", "name", cloth->weave) : json_null();
 }
 
 /* UUID version 4 from the job's inputs, so that the same job gives the same id. */
@@ -235,11 +284,11 @@ static json_t *u3m_json(const struct export_scene *e, const struct texture_princ
     if (gmtime_r(&clock, &utc) != NULL) strftime(now, sizeof now, "%Y-%m-%dT%H:%M:%SZ", &utc);
     make_uuid(e, uuid);
     return json_pack(
-        "{s:s, s:{s:s, s:s, s:s, s:s, s:s, s:o, s:n, s:n, s:{s:f, s:n, s:n, s:{s:s}, s:n, s:n}, s:n}, s:n}", "schema",
+        "{s:s, s:{s:s, s:s, s:s, s:s, s:s, s:o, s:n, s:n, s:{s:f, s:n, s:n, s:{s:s}, s:o, s:o}, s:n}, s:n}", "schema",
         "1.1", "material", "id", uuid, "name", e->report->in.sample[0] != '\0' ? e->report->in.sample : "cloth",
-        "description", "Made by Selvedge.", "created", now, "modified", now, "front", front_json(p), "back", "side",
+        "description", "Made by Selvedge.", "created", now, "modified", now, "front", front_json(e, p), "back", "side",
         "physics", "thickness", 1e3 * (e->z_high_m - e->z_low_m), "weight", "composition", "devices", "fab", "null",
-        "material_type", "construction", "metadata", "custom");
+        "material_type", woven_json(e), "construction", construction_json(e), "metadata", "custom");
 }
 
 status texture_u3m_write(const struct export_scene *e, const struct texture_principled *p, struct error *err)

@@ -12,4 +12,9 @@ status texture_materialx_write(const struct export_scene *e, const struct textur
 /* cloth.u3m: github.com/vizoogmbh/u3m, version 1.1 (u3m_schema.json). */
 status texture_u3m_write(const struct export_scene *e, const struct texture_principled *p, struct error *err);
 
+/* Millimetres between the lowest and the highest value of height.png. */
+double texture_height_range_mm(const struct export_scene *e);
+/* Pixels of preview.png along x and y: a part of the textures, at their size. */
+void texture_preview_size(const struct texture_maps *m, size_t size[2]);
+
 #endif

@@ -77,6 +77,13 @@ static struct texture_sample turned(const struct texture_sample *map, double fac
     return s;
 }
 
+struct texture_sample texture_pixel_sample(const struct texture_maps *maps, size_t i, double normal_scale)
+{
+    struct texture_sample s;
+    sample_at(maps, (double)(i % maps->width) + 0.5, (double)(i / maps->width) + 0.5, &s);
+    return turned(&s, normal_scale);
+}
+
 /* A grid over the tile, each line of it shifted against the one before, so that samples lie anywhere between the
  * pixels. */
 static void make_samples(const struct texture_maps *m, struct texture_sample *sample)
@@ -89,7 +96,7 @@ static void make_samples(const struct texture_maps *m, struct texture_sample *sa
     }
 }
 
-/* The means of the maps on a flat surface. Its tangent is that of most fibers. */
+/* The means of the maps on a flat surface, with the tangent of most fibers. */
 static void make_afar(struct search *f)
 {
     double twice[2] = {0.0, 0.0};
@@ -151,7 +158,7 @@ static void residuals(void *context, const double *x, double *out)
         const struct texture_radiance *r = &f->target->item[i];
         double rgb[3];
         if (!(r->weight > 0.0)) continue;
-        for (int afar = 0; afar <= f->model->has_afar; afar++) {
+        for (int afar = 0; afar < (f->model->has_afar ? 2 : 1); afar++) {
             const double part = r->weight / (f->model->has_afar ? 6.0 : 3.0);
             radiance_of(f, &r->configuration, afar == 1, rgb);
             for (int c = 0; c < 3; c++) *out++ = (rgb[c] - r->rgb[c]) * r->scale * sqrt(part);

@@ -41,7 +41,7 @@ struct texture_means {
     double albedo[3], transmission[3];
 };
 
-/* How far the radiances of a surface are from those of the target: differences over the mean of the target's channels,
+/* Distance of the radiances of a surface from the target: differences over the mean of the target's channels,
  * or over 0.02 where that is darker, as errors of fits (optimizer/fit/objective/objective.h). Root mean squares; NaN
  * where there is nothing to compare. */
 struct texture_error {
@@ -51,6 +51,9 @@ struct texture_error {
     double afar_rel_rms;             /* over all rows, with the means of the maps */
     double *row_rel_error;           /* of each row of the job; owned */
 };
+
+/* The place in the middle of pixel i, with slopes of the normal times normal_scale. */
+struct texture_sample texture_pixel_sample(const struct texture_maps *maps, size_t i, double normal_scale);
 
 /* Leaves the best numbers in the surface, and fills *error. STATUS_NO_MEMORY. */
 status texture_fit_run(const struct texture_model *model, void *surface, const struct texture_maps *maps,

@@ -85,8 +85,7 @@ static void box_line(const float *from, float *to, size_t n, size_t stride, long
     }
 }
 
-/* Smooths channel c of n_channel; room holds as many values as the picture has. */
-static void smooth(const struct texture_maps *m, float *value, size_t n_channel, double sd_mm, float *room)
+void texture_maps_smooth(const struct texture_maps *m, float *value, size_t n_channel, double sd_mm, float *room)
 {
     /* A box of width w has the variance (w^2 - 1) / 12. */
     long half[2];
@@ -155,7 +154,7 @@ static void make_directions(struct texture_maps *m, const float *axis)
     }
 }
 
-static double mean_radius_mm(const struct fiber_set *f)
+double texture_maps_radius_mm(const struct fiber_set *f)
 {
     double sum = 0.0;
     for (size_t i = 0; i < f->n_fiber; i++) sum += mm * (double)f->radius_m[i];
@@ -179,7 +178,7 @@ static void fill(struct texture_maps *m, const struct raster *r, const struct fi
                  float *room)
 {
     const size_t n = m->width * m->height;
-    const double sd_mm = smooth_radii * mean_radius_mm(f);
+    const double sd_mm = smooth_radii * texture_maps_radius_mm(f);
     double low, high;
     fiber_set_z_range_m(f, &low, &high);
     for (size_t i = 0; i < n; i++) {
@@ -188,11 +187,11 @@ static void fill(struct texture_maps *m, const struct raster *r, const struct fi
     }
     add_fibers(r, f);
     memcpy(smooth_mm, m->height_mm, n * sizeof *smooth_mm);
-    smooth(m, smooth_mm, 1, sd_mm, room);
+    texture_maps_smooth(m, smooth_mm, 1, sd_mm, room);
     make_normals(m, smooth_mm);
     make_spread(m);
-    smooth(m, m->spread, 1, sd_mm, room);
-    smooth(m, r->axis, 2, sd_mm, room);
+    texture_maps_smooth(m, m->spread, 1, sd_mm, room);
+    texture_maps_smooth(m, r->axis, 2, sd_mm, room);
 }
 
 /* ---- pixels of the texture ---- */
@@ -234,7 +233,7 @@ static void reduce(const struct texture_maps *fine, const float *fine_axis, size
 /* Fine pixels along an edge of a pixel: so many that a fiber is seen, and no more than a cloth has room for. */
 static size_t steps_of(const struct fiber_set *f, const struct texture_maps *m)
 {
-    const double wanted = ceil(fmax(m->pixel_mm[0], m->pixel_mm[1]) / (fine_radii * mean_radius_mm(f)));
+    const double wanted = ceil(fmax(m->pixel_mm[0], m->pixel_mm[1]) / (fine_radii * texture_maps_radius_mm(f)));
     const double most = floor((double)MOST_FINE_EDGE / (double)(m->width > m->height ? m->width : m->height));
     return (size_t)fmax(fmin(wanted, most), 1.0);
 }
@@ -261,7 +260,7 @@ status texture_maps_make(const struct fiber_set *f, const size_t size[2], struct
 {
     struct texture_maps fine = {0};
     float *fine_axis = NULL;
-    *m = (struct texture_maps){.width = size[0], .height = size[1]};
+    *m = (struct texture_maps){.width = size[0], .height = size[1], .repeat = {1, 1}};
     for (int a = 0; a < 2; a++) m->pixel_mm[a] = mm * f->tile_size_m[a] / (double)size[a];
     const size_t step = steps_of(f, m), n = m->width * m->height;
     float *axis = floats(2 * n);

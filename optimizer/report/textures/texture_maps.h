@@ -10,6 +10,7 @@
 struct texture_maps {
     size_t width, height;
     double pixel_mm[2];
+    size_t repeat[2];     /* of the tile along x and y, in the pictures that are written; 1 at first */
     float *height_mm;     /* of the highest fiber; 0 is the top of the cloth */
     float *fiber_normal;  /* x 3, of the highest fiber; (0, 0, 1) where there is none */
     float *normal;        /* x 3, of the smoothed heights */
@@ -25,6 +26,11 @@ struct texture_maps {
 status texture_maps_make(const struct fiber_set *f, const size_t size[2], struct texture_maps *m, struct error *err);
 /* Multiplies the slopes of the normals by a factor. */
 void texture_maps_scale_normals(struct texture_maps *m, double factor);
+/* Mean radius of the fibers. */
+double texture_maps_radius_mm(const struct fiber_set *f);
+/* Smooths an array of n_channel values a pixel over the edges of the tile, by nearly a Gaussian of standard deviation
+ * sd_mm. room holds as many values. */
+void texture_maps_smooth(const struct texture_maps *m, float *value, size_t n_channel, double sd_mm, float *room);
 void texture_maps_release(struct texture_maps *m);
 
 #endif

@@ -20,6 +20,9 @@ struct texture_principled {
 
 /* Fits the numbers; maps and means are given. STATUS_NO_MEMORY. */
 status texture_principled_fit(struct texture_principled *p, const struct texture_target *target, struct error *err);
+/* Radiance of a sample under a lamp of irradiance pi; as texture_model.reflect. */
+void texture_principled_reflect(const void *surface, const struct texture_sample *s, const double wi[3],
+                                const double wo[3], double rgb[3]);
 /* Roughness and anisotropy of pixel i of the maps. */
 double texture_principled_roughness(const struct texture_principled *p, size_t i);
 double texture_principled_anisotropy(const struct texture_principled *p, size_t i);

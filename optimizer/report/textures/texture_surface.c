@@ -4,8 +4,10 @@
 
 #include <math.h>
 
-/* The coat is that of OpenPBR when nothing is said of it. Its index is 1.6, which reflects this share. */
+/* OpenPBR's default coat: an index of 1.6, which reflects this share. */
 static const double coat_ior = 1.6, coat_straight = 0.0532544, least_roughness = 0.05;
+/* Least part of the reflected light that the base keeps: without it the maps of dark cloths would be black. */
+#define LEAST_BASE 0.05
 enum { N_THETA = 10, N_PHI = 12 };
 enum {
     SPECULAR,
@@ -21,8 +23,8 @@ enum {
     N_UNKNOWN,
     N_START = 3
 };
-static const double lower[N_UNKNOWN] = {1e-4, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0,
-                                        0.0,  0.0, 0.0, 0.0, 0.1, 0.0, 0.1, 0.3},
+static const double lower[N_UNKNOWN] = {1e-4,       0.0, 0.0, 0.0, 0.2, 0.0, LEAST_BASE, LEAST_BASE,
+                                        LEAST_BASE, 0.0, 0.0, 0.0, 0.1, 0.0, 0.1,        0.3},
                     upper[N_UNKNOWN] = {0.25, 1.0, 1.0, 1.0, 1.0, 0.95, 1.5, 1.5,
                                         1.5,  1.0, 1.0, 1.0, 1.0, 1.0,  1.0, 2.5};
 static const double start[N_START][TEXTURE_MAX_UNKNOWN] = {

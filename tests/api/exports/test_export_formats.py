@@ -11,6 +11,7 @@ import shutil
 import struct
 import subprocess
 import sys
+import zipfile
 
 import jsonschema
 import pbrt_file
@@ -36,7 +37,7 @@ def results(tmp_path_factory):
     (folder / "input" / "rows.csv").write_text(TABLE)
     (folder / "job.json").write_text(json.dumps({
         "sample": "exports", "fibers": {"file": "cloth.hair", "voxel_um": 5}, "measurements": {"file": "rows.csv"}, "fit": FIT,
-        "export": {name: True for name in FORMATS}}))
+        "export": {**{name: True for name in FORMATS}, "texture_cm": 2, "texture_px": 512}}))
     subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(folder)], check=True)
     return folder / "results"
 
@@ -287,7 +288,7 @@ def test_a_scene_for_blender(results, tmp_path):
 
 def check_image(image, folder):
     """The image of a U3M map: its file is there, and the size on the cloth fits its dots per inch."""
-    assert image["repeat"]["mode"] == "normal" and "/" not in image["path"]
+    assert image["repeat"]["mode"] == "normal" and "/" not in image["path"] and 19 < image["width"] < 21 and 19 < image["height"] < 21
     rows = read_png(folder / image["path"])
     width, height = len(rows[0]) / 3, len(rows)
     assert image["width"] / 25.4 * image["dpi"]["x"] == pytest.approx(width) and image["height"] / 25.4 * image["dpi"]["y"] == pytest.approx(height)
@@ -305,6 +306,22 @@ def changed(u3m, path, value):
     return copied
 
 
+def check_archive(folder, pictures):
+    """The material with its pictures as the part of a zip that U3M 1.1 allows: UTF-8, sizes before the data, nothing beside."""
+    data = (folder / "cloth.u3ma").read_bytes()
+    with zipfile.ZipFile(folder / "cloth.u3ma") as archive:
+        assert archive.testzip() is None and archive.comment == b""
+        entries = archive.infolist()
+        assert {i.filename for i in entries} == pictures | {"cloth.u3m"}
+        for i in entries:
+            assert archive.read(i) == (folder / i.filename).read_bytes() and i.date_time[0] >= 2020
+            assert (i.create_version, i.create_system, i.extract_version, i.flag_bits, i.compress_type) == (63, 0, 20, 1 << 11, 0)
+            assert i.extra == i.comment == b"" and (i.internal_attr, i.external_attr, i.volume) == (0, 0, 0)
+            header = struct.unpack_from("<4x5H3I2H", data, i.header_offset)
+            assert header[:3] + header[5:8] + header[9:] == (20, 1 << 11, 0, i.CRC, i.file_size, i.file_size, 0)
+    assert entries[0].header_offset == 0 and data[-22:-18] == b"PK\5\6"
+
+
 def test_a_u3m_material(results):
     """The file has what the public schema of version 1.1 (github.com/vizoogmbh/u3m) requires and allows, which notices what it does not allow."""
     folder = results / "export" / "textures"
@@ -320,8 +337,9 @@ def test_a_u3m_material(results):
         assert not schema.is_valid(changed(u3m, path, value)), path
     m, front = u3m["material"], u3m["material"]["front"]
     assert m["name"] == "exports" and m["back"] is m["side"] is None and m["physics"]["thickness"] > 0
-    maps = [v["texture"]["image"] for v in front.values() if isinstance(v, dict) and v["texture"]]
-    assert len(maps) == 6
+    maps = [v["texture"]["image"] for v in front.values() if isinstance(v, dict) and v.get("texture")]
+    assert len(maps) == 7 and front["displacement"]["texture"]["factor"] == pytest.approx(m["physics"]["thickness"])
+    check_archive(folder, {i["path"] for i in maps} | {front["preview"]["path"]})
     for image in maps:
         check_image(image, folder)
     principled = conversion_of(results, "textures")["materials"][0]["principled"]
@@ -338,20 +356,33 @@ def test_a_u3m_material(results):
         assert sum(linear) / len(linear) == pytest.approx(principled["base_color"][c], rel=0.03, abs=0.003)
 
 
+def check_repeats(folder, material):
+    """Whole tiles: each is as the first one, and the step from a tile to the next is no larger than steps inside of it."""
+    (width, height), repeats = material["size_px"], material["repeats"]
+    assert width <= 512 and height <= 512 and width % repeats[0] == height % repeats[1] == 0 and material["size_mm"][0] == pytest.approx(20, abs=1)
+    tile = width // repeats[0]
+    for name in ("base_color", "normal", "height"):
+        rows = read_png(folder / f"{name}.png")
+        assert len(rows) == height and len(rows[0]) == 3 * width
+        assert rows[height // repeats[1]] == rows[0] and all(row[:3 * tile] == row[3 * tile:6 * tile] for row in rows), name
+        steps = [sum(abs(row[3 * x] - row[3 * x + 3]) for row in rows) / height for x in range(tile)]  # the last one leads to the next tile
+        assert steps[-1] < 1.6 * max(steps[:-1]) + 1, (name, steps)
+
+
 def test_textures_of_a_tile(results):
     export, folder = conversion_of(results, "textures"), results / "export" / "textures"
     (material,) = export["materials"]
     assert sorted(p.name for p in folder.iterdir()) == sorted([
-        "conversion.json", "cloth.mtlx", "cloth.u3m", "maps.exr", *(f"{n}.png" for n in (
+        "conversion.json", "cloth.mtlx", "cloth.u3m", "cloth.u3ma", "maps.exr", "preview.png", "height.png", *(f"{n}.png" for n in (
             "base_color", "principled_base_color", "principled_roughness", "principled_anisotropy", "transmission", "normal", "roughness", "anisotropy",
             "anisotropy_rotation"))])
-    rows = json.loads((results / "result.json").read_text())["rows"]
+    sets = [row["set"] for row in json.loads((results / "result.json").read_text())["rows"]]
     for found in (material, material["principled"]):
         assert 0 < found["rel_rms"] < 0.2 and 0 < found["heldout_rel_rms"] < 0.3 and 0 < found["hemisphere_rel_rms"] < 0.3
-        of_set = {s: [e for e, row in zip(found["row_rel_errors"], rows) if row["set"] == s] for s in ("fit", "held-out")}
-        assert math.hypot(*of_set["fit"]) / len(of_set["fit"]) ** 0.5 == pytest.approx(found["rel_rms"])
-        assert math.hypot(*of_set["held-out"]) / len(of_set["held-out"]) ** 0.5 == pytest.approx(found["heldout_rel_rms"])
-    assert export["row_rel_errors"] == material["principled"]["row_rel_errors"] and 0 < material["pixel_rel_se"] < 0.5
+        for name, key in (("fit", "rel_rms"), ("held-out", "heldout_rel_rms")):
+            assert math.hypot(*(e for e, s in zip(found["row_rel_errors"], sets) if s == name)) / sets.count(name) ** 0.5 == pytest.approx(found[key])
+    assert export["row_rel_errors"] == material["principled"]["row_rel_errors"] and 0 < material["pixel_rel_se"] < 0.02
+    check_repeats(folder, material)
     # a fiber that scatters less than all its light makes a cloth that does so, too
     both = [a + b for a, b in zip(material["albedo"], material["transmission"])]
     assert all(0 < x < 1 for x in both)
