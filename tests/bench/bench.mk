@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics gallery docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-weave bench-weave-rendered
+.PHONY: bench bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports exports-side-by-side bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics gallery docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 $(BUILD)/tests/bench/models/bench_waves: LINK_TEST := $(LINK_WAVE)
 # bench_fit is more than one file
@@ -129,6 +129,11 @@ $(EXPORTS_NODE)/packages-are-there:
 bench-exports: $(EXPORTS_PYTHON)/bin/packages-are-there $(EXPORTS_NODE)/packages-are-there | deps-test ## exports of twelve fits rendered by Mitsuba 3 and Blender against the jobs' own renderings (50 minutes on 2 quiet cores; installs Mitsuba and USD from PyPI, three.js from npm into build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_exports.py --build $(BUILD) --python $(EXPORTS_PYTHON)/bin/python $(EXPORTS)
+
+# SIDE: options of the program, such as SIDE="--px 256 --samples 4"
+exports-side-by-side: $(EXPORTS_PYTHON)/bin/packages-are-there $(EXPORTS_NODE)/packages-are-there | deps-test ## build/exports-side-by-side.png: one drape in the job, Mitsuba, Blender and three.js (five minutes; the job is kept in build)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/pictures/exports_side_by_side.py --build $(BUILD) --out $(BUILD)/exports-side-by-side.png $(SIDE)
 
 bench-camera: | deps-test ## mean radiances from raw files of a simulated camera against the true ones (2 minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
