@@ -9,6 +9,7 @@
 #include "optimizer/report/export/export_scene.h"
 #include "optimizer/report/textures/texture_documents.h"
 #include "optimizer/report/textures/texture_tile.h"
+#include "optimizer/report/textures/texture_usd.h"
 #include "optimizer/report/textures/u3ma_file.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 
@@ -30,7 +31,8 @@ enum {
     PRINCIPLED_BASE,
     PRINCIPLED_ROUGHNESS = 16,
     PRINCIPLED_ANISOTROPY,
-    N_CHANNEL
+    REFLECTED,
+    N_CHANNEL = REFLECTED + 3
 };
 static const double percent = 100.0, most_row_error = 0.1; /* of a cloth that is exported without a warning */
 static const char *const channel[N_CHANNEL] = {"R",
@@ -50,7 +52,10 @@ static const char *const channel[N_CHANNEL] = {"R",
                                                "principled.G",
                                                "principled.B",
                                                "principled.roughness",
-                                               "principled.anisotropy"};
+                                               "principled.anisotropy",
+                                               "reflected.R",
+                                               "reflected.G",
+                                               "reflected.B"};
 
 struct textures {
     struct export_scene *e;
@@ -112,6 +117,7 @@ static void pixel_of(const struct textures *t, size_t i, float out[N_CHANNEL])
         /* in proportion, so that the mean is right in spite of the noise of dark pixels */
         const double share = (double)t->tile.reflected.pixel[3 * i + c] / fmax(t->tile.means.albedo[c], 1e-9);
         out[BASE + c] = (float)(share * t->surface.base[c]);
+        out[REFLECTED + c] = t->tile.reflected.pixel[3 * i + c];
         out[TRANSMISSION + c] = t->tile.transmitted.pixel[3 * i + c];
         out[NORMAL + c] = t->tile.maps.normal[3 * i + c];
         out[PRINCIPLED_BASE + c] = (float)(share * t->principled.base[c]);
@@ -139,7 +145,7 @@ static uint8_t byte_of(float value) { return (uint8_t)lround(255.0 * fmin(fmax((
 static status write_map(const struct textures *t, const struct image *all, size_t first, size_t n, const char *name,
                         struct error *err)
 {
-    const bool is_color = first < NORMAL || first == PRINCIPLED_BASE;
+    const bool is_color = first < NORMAL || first == PRINCIPLED_BASE || first == REFLECTED;
     const size_t n_px = all->width * all->height;
     uint8_t *tile = malloc(3 * n_px);
     if (tile == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write textures: out of memory");
@@ -212,7 +218,8 @@ static status write_maps(const struct textures *t, struct error *err)
                {PRINCIPLED_BASE, 3, "principled_base_color.png"},
                {PRINCIPLED_ROUGHNESS, 1, "principled_roughness.png"},
                {PRINCIPLED_ANISOTROPY, 1, "principled_anisotropy.png"},
-               {HEIGHT, 1, "height.png"}};
+               {HEIGHT, 1, "height.png"},
+               {REFLECTED, 3, "reflected.png"}};
     struct image all;
     status s = image_init(&all, t->tile.maps.width, t->tile.maps.height, N_CHANNEL, err);
     if (s != STATUS_OK) return s;
@@ -323,6 +330,7 @@ static status write_textures(struct export_scene *e, json_t **materials, struct 
     if (s == STATUS_OK) s = fit_surfaces(&t, err);
     if (s == STATUS_OK) s = write_maps(&t, err);
     if (s == STATUS_OK) s = texture_materialx_write(e, &t.surface, err);
+    if (s == STATUS_OK) s = texture_usd_write(e, &t.surface, err);
     if (s == STATUS_OK) s = write_preview(&t, err);
     if (s == STATUS_OK) s = texture_u3m_write(e, &t.principled, err);
     if (s == STATUS_OK) s = write_archive(&t, err);

@@ -17,6 +17,7 @@ import jsonschema
 import pbrt_file
 import pytest
 from daemon_under_test import ROOT, program
+from exports_python import by_python
 from small_cloth import TABLE, hair
 
 sys.path.insert(0, os.path.join(ROOT, "tests", "bench"))
@@ -26,7 +27,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selved
 FIT = {"path_budget": 20000, "render_px": 8, "render_samples": 1, "model": "isotropic.v1"}
 FORMATS = ["pbrt", "usd", "blender", "textures"]
 SUPPORT = os.path.join(ROOT, "tests", "support")
-PYTHON = os.path.join(os.path.dirname(os.path.dirname(program("selvedge-worker"))), "exports-python", "bin", "python")
 
 
 @pytest.fixture(scope="module")
@@ -47,15 +47,6 @@ def conversion_of(results, name):
     (export,) = [e for e in json.loads((results / "result.json").read_text())["exports"] if e["format"] == name]
     assert json.loads((results / "export" / name / "conversion.json").read_text()) == export
     return export
-
-
-def by_python(module, script, *arguments):
-    """What a script prints, run by the Python of `make bench-exports`; the test is skipped where this Python has no such module."""
-    if not os.access(PYTHON, os.X_OK) or subprocess.run([PYTHON, "-c", f"import {module}"], capture_output=True, check=False).returncode != 0:
-        pytest.skip(f"the files are right so far; no Python with {module} to open them with (make test installs it where there is a package index)")
-    done = subprocess.run([PYTHON, script, *map(str, arguments)], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 def hair_shares(material, channel, n_theta=16, n_phi=10):
@@ -198,55 +189,6 @@ def test_the_opaque_fiber_of_usd(results):
     assert (difference / whole) ** 0.5 == pytest.approx(preview["rel_rms"], rel=0.05)
 
 
-def read_vol(path):
-    """Size, channels, box and samples of a grid volume with float32 samples, as Mitsuba's gridvolume reads them."""
-    data = path.read_bytes()
-    assert data[:4] == b"VOL\x03"
-    kind, nx, ny, nz, n_channel, *box = struct.unpack("<5i6f", data[4:48])
-    assert kind == 1 and len(data) == 48 + 4 * nx * ny * nz * n_channel
-    return (nx, ny, nz), n_channel, box, struct.unpack(f"<{nx * ny * nz * n_channel}f", data[48:])
-
-
-def test_volumes_of_a_scan(tmp_path):
-    folder = tmp_path / "job"
-    subprocess.run([program("selvedge-phantom"), "cloth", "--weave", "plain", "--fibers-per-yarn", "7", "--out", tmp_path / "phantom"], check=True,
-                   capture_output=True)
-    (folder / "input").mkdir(parents=True)
-    (tmp_path / "phantom" / "scan.tif").rename(folder / "input" / "scan.tif")
-    (folder / "input" / "rows.csv").write_text(TABLE)
-    (folder / "job.json").write_text(json.dumps({
-        "sample": "scan", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}, "measurements": {"file": "rows.csv"}, "fit": FIT,
-        "export": {"mitsuba": True, "blender": True}}))
-    subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(folder)], check=True, env={**os.environ, "PATH": "/nowhere"})
-    (told,) = [w for w in json.loads((folder / "results" / "result.json").read_text())["warnings"] if "cloth.blend" in w]
-    assert "this machine has no Blender: run cloth.py" in told and not (folder / "results" / "export" / "blender" / "cloth.blend").exists()
-    made = folder / "results" / "export" / "mitsuba"
-    size, n_channel, box, density = read_vol(made / "density.vol")
-    assert n_channel == 1 and 0 <= min(density) < 0.05 and 0.5 < max(density) <= 1
-    assert [(b - a) / n for a, b, n in zip(box, box[3:], size)] == pytest.approx([0.002] * 3, rel=1e-4)
-    same_size, n_channel, same_box, direction = read_vol(made / "direction.vol")
-    lengths = [math.hypot(*direction[i:i + 3]) for i in range(0, len(direction), 3)]
-    assert (same_size, n_channel, same_box) == (size, 3, box) and all(x == 0 or x == pytest.approx(1, abs=1e-5) for x in lengths)
-    inside = [d for d, x in zip(density, lengths) if x > 0]
-    outside = [d for d, x in zip(density, lengths) if x == 0]
-    assert len(inside) > 1000 and sum(inside) / len(inside) > 2 * sum(outside) / len(outside)
-    flat, n_channel, flat_box, sggx = read_vol(made / "sggx.vol")
-    assert (flat, n_channel, flat_box) == (size, 6, box)
-    voxel = max(range(len(lengths)), key=lambda i: lengths[i] * density[i])
-    t, s = direction[3 * voxel:3 * voxel + 3], sggx[6 * voxel:6 * voxel + 6]
-    taken = 3 - sum(s[:3])
-    assert 0.1 < taken < 1 and [-s[k] / taken for k in (3, 4, 5)] == pytest.approx([t[0] * t[1], t[0] * t[2], t[1] * t[2]], abs=1e-5)
-    void = lengths.index(0)
-    assert sggx[6 * void:6 * void + 6] == (1, 1, 1, 0, 0, 0)
-    seen = by_python("mitsuba", os.path.join(ROOT, "tests", "support", "python", "mitsuba_volume.py"), made / "density.vol", made / "direction.vol")
-    assert json.loads(seen) == pytest.approx([max(density), max(direction)])
-    place = [(index + 0.5) / n for index, n in zip((voxel % size[0], voxel // size[0] % size[1], voxel // (size[0] * size[1])), size)]
-    flakes = json.loads(by_python("mitsuba", os.path.join(ROOT, "tests", "support", "python", "mitsuba_volume.py"), "flakes", made / "sggx.vol",
-                                  made / "density.vol", *place, *t))
-    assert flakes["areas"] == pytest.approx([math.sqrt(1 - taken), 1, 1], abs=1e-3)
-    assert 0.1 < flakes["radiance"] < 1
-
-
 def in_blender(folder, tmp_path, *row):
     """What Blender has and renders when it runs the exported script."""
     done = subprocess.run(
@@ -284,6 +226,11 @@ def test_a_scene_for_blender(results, tmp_path):
         assert look["camera"] == pytest.approx([float(row[f"camera_{x}_mm"]) for x in "xyz"], rel=1e-5)
         assert look["mean"] == pytest.approx([float(row[f"rendered_{c}"]) for c in "rgb"], rel=0.4)
     assert found["camera"] != pytest.approx(other["camera"], rel=0.01)
+
+
+def linear(byte):
+    x = byte / 255
+    return x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4
 
 
 def check_image(image, folder):
@@ -352,8 +299,8 @@ def test_a_u3m_material(results):
     # the mean of the map is the mean that was fitted
     rows = read_png(folder / "principled_base_color.png")
     for c in range(3):
-        linear = [s / 12.92 if s <= 0.04045 else ((s + 0.055) / 1.055) ** 2.4 for row in rows for s in (x / 255 for x in row[c::3])]
-        assert sum(linear) / len(linear) == pytest.approx(principled["base_color"][c], rel=0.03, abs=0.003)
+        values = [linear(x) for row in rows for x in row[c::3]]
+        assert sum(values) / len(values) == pytest.approx(principled["base_color"][c], rel=0.03, abs=0.003)
 
 
 def check_repeats(folder, material):
@@ -373,9 +320,13 @@ def test_textures_of_a_tile(results):
     export, folder = conversion_of(results, "textures"), results / "export" / "textures"
     (material,) = export["materials"]
     assert sorted(p.name for p in folder.iterdir()) == sorted([
-        "conversion.json", "cloth.mtlx", "cloth.u3m", "cloth.u3ma", "maps.exr", "preview.png", "height.png", *(f"{n}.png" for n in (
+        "conversion.json", "cloth.mtlx", "cloth.u3m", "cloth.u3ma", "cloth.usda", "maps.exr", "preview.png", "height.png", *(f"{n}.png" for n in (
             "base_color", "principled_base_color", "principled_roughness", "principled_anisotropy", "transmission", "normal", "roughness", "anisotropy",
-            "anisotropy_rotation"))])
+            "anisotropy_rotation", "reflected"))])
+    assert json.loads(by_python("pxr", os.path.join(SUPPORT, "exports", "usd_check.py"), folder / "cloth.usda")) == [[]]
+    for c in range(3):
+        mean = [linear(x) for row in read_png(folder / "reflected.png") for x in row[c::3]]
+        assert sum(mean) / len(mean) == pytest.approx(material["albedo"][c], rel=0.03, abs=0.003), "what the preview surface reflects"
     sets = [row["set"] for row in json.loads((results / "result.json").read_text())["rows"]]
     for found in (material, material["principled"]):
         assert 0 < found["rel_rms"] < 0.2 and 0 < found["heldout_rel_rms"] < 0.3 and 0 < found["hemisphere_rel_rms"] < 0.3

@@ -17,8 +17,9 @@ sys.path.insert(0, SUPPORT)
 import gltf_viewer  # noqa: E402
 
 CLOTH = {"draft": ["110", "101", "011"], "tile_warps": 6, "tile_wefts": 6, "cover_warp": 1.1, "yarns": [{"fibers": 30, "fiber_radius_um": 16.1}]}
-FIT = {"model": "two_lobe.v1", "fixed": {"C_R": [0.185, 0.047, 0.069], "C_TT": [0.999, 0.330, 0.354], "beta_R": 8, "beta_TT": 20, "gamma_TT": 30},
-       "render_px": 96, "render_samples": 16}
+BOUNDS = {"C_TT.r": [0.97, 0.99], "C_TT.g": [0.32, 0.34], "C_TT.b": [0.34, 0.36]}  # the fit ends at these, whatever the rows are
+FIT = {"model": "two_lobe.v1", "fixed": {"C_R": [0.185, 0.047, 0.069], "beta_R": 8, "beta_TT": 20, "gamma_TT": 30}, "bounds": BOUNDS,
+       "start": {k: sum(v) / 2 for k, v in BOUNDS.items()}, "path_budget": 100000, "render_px": 96, "render_samples": 16}
 ROWS = [(30, 0, 0, 0, 0), (30, 180, 30, 0, 0), (45, 180, 45, 0, 0), (60, 180, 45, 0, 0), (45, 90, 45, 0, 0), (60, 90, 30, 0, 0), (20, 0, 60, 0, 0),
         (60, 0, 60, 180, 90), (45, 0, 45, 180, 90)]
 VIEW = {"on": "drape", "radius_mm": 10, "size_mm": 40, "width_mm": 36, "light_theta_deg": 45, "light_phi_deg": 200, "camera_theta_deg": 50,
