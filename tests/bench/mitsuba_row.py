@@ -198,9 +198,11 @@ def textures_scene(folder, row, px, spp):
     surface = {"type": "principled", "base_color": colors("basecolor"), "roughness": numbers("roughness"), "anisotropic": numbers("anisotropy_value"),
                "specular": front["specular_value"]["constant"], "sheen": front["sheen_value"]["constant"], "sheen_tint": front["sheen_tint"]["constant"]}
     turned = {"type": "turned", "inner": surface, "turns": numbers("anisotropy_rotation")}
-    plane = {"type": "rectangle", "to_world": mitsuba.ScalarTransform4f().scale([half, half, 1]),
-             "bsdf": {"type": "normalmap", "normalmap": texture("normal", 0.5 * (normal + 1)), "use_shadowing_function": False,
-                      "flip_invalid_normals": False, "bsdf": turned}}
+    bsdf = {"type": "normalmap", "normalmap": texture("normal", 0.5 * (normal + 1)), "use_shadowing_function": False,
+            "flip_invalid_normals": False, "bsdf": turned}
+    if front["alpha"]["texture"]:
+        bsdf = {"type": "mask", "opacity": numbers("alpha"), "bsdf": bsdf}
+    plane = {"type": "rectangle", "to_world": mitsuba.ScalarTransform4f().scale([half, half, 1]), "bsdf": bsdf}
     return mitsuba.load_dict({"type": "scene", "integrator": {"type": "path"}, "plane": plane, **pbrt_surroundings(found, px, spp)})
 
 

@@ -31,9 +31,11 @@ enum {
     PRINCIPLED_BASE,
     PRINCIPLED_ROUGHNESS = 16,
     PRINCIPLED_ANISOTROPY,
+    OPACITY,
     REFLECTED,
     N_CHANNEL = REFLECTED + 3
 };
+static const double least_holes = 0.995;                   /* cover of a cloth below which it has an opacity */
 static const double percent = 100.0, most_row_error = 0.1; /* of a cloth that is exported without a warning */
 static const char *const channel[N_CHANNEL] = {"R",
                                                "G",
@@ -53,6 +55,7 @@ static const char *const channel[N_CHANNEL] = {"R",
                                                "principled.B",
                                                "principled.roughness",
                                                "principled.anisotropy",
+                                               "opacity",
                                                "reflected.R",
                                                "reflected.G",
                                                "reflected.B"};
@@ -113,12 +116,14 @@ static status write_repeated(const struct textures *t, const uint8_t *tile, cons
 /* All maps of pixel i, in the order of `channel`. */
 static void pixel_of(const struct textures *t, size_t i, float out[N_CHANNEL])
 {
+    const double opacity = texture_maps_opacity(&t->tile.maps, i),
+                 straight = t->tile.maps.cut_out ? 1.0 - (double)t->tile.maps.cover[i] : 0.0;
     for (size_t c = 0; c < 3; c++) {
         /* in proportion, so that the mean is right in spite of the noise of dark pixels */
-        const double share = (double)t->tile.reflected.pixel[3 * i + c] / fmax(t->tile.means.albedo[c], 1e-9);
+        const double share = (double)t->tile.maps.share[3 * i + c] / opacity;
         out[BASE + c] = (float)(share * t->surface.base[c]);
         out[REFLECTED + c] = t->tile.reflected.pixel[3 * i + c];
-        out[TRANSMISSION + c] = t->tile.transmitted.pixel[3 * i + c];
+        out[TRANSMISSION + c] = (float)(fmax((double)t->tile.transmitted.pixel[3 * i + c] - straight, 0.0) / opacity);
         out[NORMAL + c] = t->tile.maps.normal[3 * i + c];
         out[PRINCIPLED_BASE + c] = (float)(share * t->principled.base[c]);
     }
@@ -127,6 +132,7 @@ static void pixel_of(const struct textures *t, size_t i, float out[N_CHANNEL])
     out[PRINCIPLED_ROUGHNESS] = (float)texture_principled_roughness(&t->principled, i);
     out[PRINCIPLED_ANISOTROPY] = (float)texture_principled_anisotropy(&t->principled, i);
     out[DIRECTION] = t->tile.maps.direction_rad[i];
+    out[OPACITY] = t->tile.maps.cover[i];
     out[HEIGHT] = t->tile.maps.height_mm[i];
 }
 
@@ -196,12 +202,13 @@ static status write_archive(const struct textures *t, struct error *err)
                                        "principled_anisotropy.png",
                                        "anisotropy_rotation.png",
                                        "transmission.png",
-                                       "height.png"};
+                                       "height.png",
+                                       "opacity.png"};
     char path[WORKER_PATH_BYTES], part[WORKER_PATH_BYTES], folder[WORKER_PATH_BYTES];
+    const size_t all = sizeof name / sizeof *name, n = t->tile.maps.cut_out ? all : all - 1;
     worker_folder_path(t->e->report->in.job->tools->folder, JOB_FOLDER_RESULTS, t->e->folder, folder);
     paths_of(t, "cloth.u3ma", path, part);
-    return publish(t, u3ma_file_write(part, folder, name, sizeof name / sizeof *name, time(NULL), err), part, path,
-                   err);
+    return publish(t, u3ma_file_write(part, folder, name, n, time(NULL), err), part, path, err);
 }
 
 static status write_maps(const struct textures *t, struct error *err)
@@ -219,6 +226,7 @@ static status write_maps(const struct textures *t, struct error *err)
                {PRINCIPLED_ROUGHNESS, 1, "principled_roughness.png"},
                {PRINCIPLED_ANISOTROPY, 1, "principled_anisotropy.png"},
                {HEIGHT, 1, "height.png"},
+               {OPACITY, 1, "opacity.png"},
                {REFLECTED, 3, "reflected.png"}};
     struct image all;
     status s = image_init(&all, t->tile.maps.width, t->tile.maps.height, N_CHANNEL, err);
@@ -284,6 +292,7 @@ static json_t *material_json(const struct textures *t)
     json_object_set_new(json, "transmission", json_number_list(t->tile.means.transmission, 3, 1.0));
     json_object_set_new(json, "pixel_rel_se", json_number(t->tile.noise[0].rel_se));
     json_object_set_new(json, "transmission_pixel_rel_se", json_number(t->tile.noise[1].rel_se));
+    json_object_set_new(json, "opacity", json_number(texture_maps_cover(&t->tile.maps)));
     put_size(t, json);
     put_error(json, &t->surface.error, n_row);
     json_object_set_new(json, "principled", principled_json(&t->principled, n_row));
@@ -321,12 +330,21 @@ static status fit_surfaces(struct textures *t, struct error *err)
     return s;
 }
 
+/* A cloth through which one sees is a surface with holes; what it lets through besides is scattered. */
+static void find_holes(struct texture_tile *t)
+{
+    const double cover = texture_maps_cover(&t->maps);
+    t->maps.cut_out = cover < least_holes;
+    for (int c = 0; c < 3; c++) t->means.transmission[c] = fmax(t->means.transmission[c] - (1.0 - cover), 0.0);
+}
+
 static status write_textures(struct export_scene *e, json_t **materials, struct error *err)
 {
     struct textures t = {.e = e};
     const struct texture_size size = texture_size_wanted(e);
     status s = texture_tile_make(e, size.tile_px, &t.tile, err);
     memcpy(t.tile.maps.repeat, size.repeat, sizeof size.repeat);
+    if (s == STATUS_OK) find_holes(&t.tile);
     if (s == STATUS_OK) s = fit_surfaces(&t, err);
     if (s == STATUS_OK) s = write_maps(&t, err);
     if (s == STATUS_OK) s = texture_materialx_write(e, &t.surface, err);

@@ -65,7 +65,7 @@ static const char graph_nodes[] =
     "    <output name=\"out_roughness\" type=\"float\" nodename=\"roughness\"/>\n"
     "    <output name=\"out_anisotropy\" type=\"float\" nodename=\"anisotropy\"/>\n"
     "    <output name=\"out_normal\" type=\"vector3\" nodename=\"shading_normal\"/>\n"
-    "    <output name=\"out_tangent\" type=\"vector3\" nodename=\"across_fibers\"/>\n  </nodegraph>\n";
+    "    <output name=\"out_tangent\" type=\"vector3\" nodename=\"across_fibers\"/>\n";
 
 static const char surface_inputs[] =
     "    <input name=\"base_color\" type=\"color3\" nodegraph=\"maps\" output=\"out_base\"/>\n"
@@ -128,7 +128,15 @@ status texture_materialx_write(const struct export_scene *e, const struct textur
             "      <input name=\"in2\" type=\"float\" value=\"%.6g\"/>\n    </multiply>\n",
             1.0 / fmax(texture_surface_kept(t), 0.01));
     fputs(graph_nodes, text.file);
+    if (m->cut_out) {
+        print_image(text.file, "opacity", "float", "opacity.png", false, size_mm);
+        fputs("    <output name=\"out_opacity\" type=\"float\" nodename=\"opacity\"/>\n", text.file);
+    }
+    fputs("  </nodegraph>\n", text.file);
     fprintf(text.file, "  <open_pbr_surface name=\"surface\" type=\"surfaceshader\">\n%s", surface_inputs);
+    if (m->cut_out)
+        fputs("    <input name=\"geometry_opacity\" type=\"float\" nodegraph=\"maps\" output=\"out_opacity\"/>\n",
+              text.file);
     print_numbers(text.file, t);
     fputs("  </open_pbr_surface>\n  <surfacematerial name=\"cloth\" type=\"material\">\n"
           "    <input name=\"surfaceshader\" type=\"surfaceshader\" nodename=\"surface\"/>\n"
@@ -201,7 +209,6 @@ static void add_rest(json_t *v)
                                        "specular_tint",   "subsurface_radius",   "subsurface_value"};
     static const double white[3] = {1.0, 1.0, 1.0};
     for (size_t i = 0; i < sizeof zero / sizeof zero[0]; i++) json_object_set_new(v, zero[i], number_json(0.0));
-    json_object_set_new(v, "alpha", number_json(1.0));
     json_object_set_new(v, "ior", number_json(1.5));
     json_object_set_new(v, "clearcoat_normal", normal_json(NULL, NULL, 1.0));
     json_object_set_new(v, "subsurface_color", json_pack("{s:o, s:n}", "constant", rgb_json(white), "texture"));
@@ -244,6 +251,8 @@ static json_t *front_json(const struct export_scene *e, const struct texture_pri
         number_map_json(fmin((through[0] + through[1] + through[2]) / 3.0, 1.0), 1.0, m, "transmission.png"));
     json_object_set_new(v, "displacement",
                         number_map_json(mean_height_mm(e, m), texture_height_range_mm(e), m, "height.png"));
+    json_object_set_new(v, "alpha",
+                        m->cut_out ? number_map_json(texture_maps_cover(m), 1.0, m, "opacity.png") : number_json(1.0));
     json_object_set_new(v, "preview", preview_json(m));
     json_object_set_new(v, "specular_value", number_json(p->specular));
     json_object_set_new(v, "sheen_value", number_json(p->sheen));

@@ -56,8 +56,10 @@ static void sample_at(const struct texture_maps *m, double x, double y, struct t
         for (size_t a = 0; a < 3; a++) s->normal[a] += weight[k] * (double)m->normal[3 * pixel[k] + a];
         s->root_spread += weight[k] * sqrt((double)m->spread[pixel[k]]);
         s->coherence += weight[k] * (double)m->coherence[pixel[k]];
+        const double opacity = texture_maps_opacity(m, pixel[k]);
+        s->opacity += weight[k] * opacity;
         for (size_t c = 0; c < 3; c++)
-            s->share[c] += weight[k] * (m->share != NULL ? (double)m->share[3 * pixel[k] + c] : 1.0);
+            s->share[c] += weight[k] * (m->share != NULL ? (double)m->share[3 * pixel[k] + c] / opacity : 1.0);
     }
     memcpy(s->tangent, across, sizeof across);
 }
@@ -100,7 +102,7 @@ static void make_samples(const struct texture_maps *m, struct texture_sample *sa
 static void make_afar(struct search *f)
 {
     double twice[2] = {0.0, 0.0};
-    f->afar = (struct texture_sample){.normal = {0.0, 0.0, 1.0}, .share = {1.0, 1.0, 1.0}};
+    f->afar = (struct texture_sample){.normal = {0.0, 0.0, 1.0}, .share = {1.0, 1.0, 1.0}, .opacity = 1.0};
     for (size_t k = 0; k < N_SAMPLE; k++) {
         const struct texture_sample *s = &f->map[k];
         f->afar.root_spread += s->root_spread / N_SAMPLE;
@@ -129,8 +131,9 @@ static void add_rotation(const struct search *f, const struct configuration *k, 
     }
     f->model->look(f->surface, wo);
     for (size_t i = 0; i < n_sample; i++) {
-        f->model->reflect(f->surface, afar ? &f->afar : &f->sample[step * i + r % step], wi, wo, one);
-        for (int c = 0; c < 3; c++) rgb[c] += one[c] / (double)n_sample;
+        const struct texture_sample *s = afar ? &f->afar : &f->sample[step * i + r % step];
+        f->model->reflect(f->surface, s, wi, wo, one);
+        for (int c = 0; c < 3; c++) rgb[c] += one[c] * s->opacity / (double)n_sample;
     }
 }
 

@@ -17,7 +17,8 @@ enum { TEXTURE_MAX_UNKNOWN = LEAST_SQUARES_MAX_UNKNOWN };
 struct texture_sample {
     double tangent[3], bitangent[3], normal[3];
     double root_spread, coherence;
-    double share[3]; /* brightness of the map of reflected light here, over its mean */
+    double share[3]; /* brightness of the surface under even light, over the mean of the map */
+    double opacity;  /* 1 without cut_out */
 };
 
 struct texture_model {

@@ -1,7 +1,6 @@
 #include "optimizer/report/textures/texture_maps.h"
 
 #include <math.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -274,6 +273,19 @@ status texture_maps_make(const struct fiber_set *f, const size_t size[2], struct
     free(fine_axis);
     texture_maps_release(&fine);
     return whole ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot make textures: out of memory");
+}
+
+double texture_maps_cover(const struct texture_maps *m)
+{
+    const size_t n = m->width * m->height;
+    double sum = 0.0;
+    for (size_t i = 0; i < n; i++) sum += (double)m->cover[i];
+    return sum / (double)n;
+}
+
+double texture_maps_opacity(const struct texture_maps *m, size_t i)
+{
+    return m->cut_out ? fmax((double)m->cover[i], 0.1) : 1.0;
 }
 
 void texture_maps_scale_normals(struct texture_maps *m, double factor)

@@ -7,6 +7,8 @@
 
 #include "geometry/fibers/fiber_set.h"
 
+#include <stdbool.h>
+
 struct texture_maps {
     size_t width, height;
     double pixel_mm[2];
@@ -18,12 +20,17 @@ struct texture_maps {
     float *direction_rad; /* along the fibers, from +x, in [0, pi) */
     float *coherence;     /* 0: fibers run everywhere; 1: all along direction */
     float *cover;         /* part of the pixel where a fiber is seen */
+    bool cut_out;         /* cover is the opacity of a surface, which is fitted with it; false at first */
     float *share;         /* x 3, brightness of reflected light over its mean (texture_tile.h); NULL: not rendered */
 };
 
 /* size: pixels along x and y. Pixels that are wide beside a fiber are means over finer ones. STATUS_NO_MEMORY. The
  * caller releases the maps, also on failure. */
 status texture_maps_make(const struct fiber_set *f, const size_t size[2], struct texture_maps *m, struct error *err);
+/* Mean of cover. */
+double texture_maps_cover(const struct texture_maps *m);
+/* Part of a pixel that the surface covers, at least a tenth; 1 without cut_out. */
+double texture_maps_opacity(const struct texture_maps *m, size_t i);
 /* Multiplies the slopes of the normals by a factor. */
 void texture_maps_scale_normals(struct texture_maps *m, double factor);
 /* Mean radius of the fibers. */

@@ -101,7 +101,7 @@ static double microfacets(const struct texture_sample *s, const struct meeting *
 /* Shares of the light from directions of all cosines that the microfacets of a flat surface reflect. */
 static void set_albedo(double roughness, double straight, struct texture_lobe_albedo *out)
 {
-    static const struct texture_sample flat = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 1.0, 0.0, {1, 1, 1}};
+    static const struct texture_sample flat = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 1.0, 0.0, {1, 1, 1}, 1.0};
     for (int j = 0; j < TEXTURE_N_COSINE; j++) {
         const double cosine = fmax((double)j / (TEXTURE_N_COSINE - 1), 0.02),
                      wo[3] = {sqrt(1.0 - cosine * cosine), 0.0, cosine};

@@ -285,7 +285,7 @@ def test_a_u3m_material(results):
     m, front = u3m["material"], u3m["material"]["front"]
     assert m["name"] == "exports" and m["back"] is m["side"] is None and m["physics"]["thickness"] > 0
     maps = [v["texture"]["image"] for v in front.values() if isinstance(v, dict) and v.get("texture")]
-    assert len(maps) == 7 and front["displacement"]["texture"]["factor"] == pytest.approx(m["physics"]["thickness"])
+    assert len(maps) == 7 + (front["alpha"]["texture"] is not None) and front["displacement"]["texture"]["factor"] == pytest.approx(m["physics"]["thickness"])
     check_archive(folder, {i["path"] for i in maps} | {front["preview"]["path"]})
     for image in maps:
         check_image(image, folder)
@@ -296,10 +296,10 @@ def test_a_u3m_material(results):
     assert front["normal"]["texture"]["scale"] == pytest.approx(principled["normal_scale"], rel=1e-6)
     for name in ("specular_value", "sheen_value", "sheen_tint"):
         assert front[name]["constant"] == pytest.approx(principled[name.replace("_value", "")])
-    # the mean of the map is the mean that was fitted
-    rows = read_png(folder / "principled_base_color.png")
+    # the mean of the map is the mean that was fitted; holes count as black
+    rows, cover = (b"".join(map(bytes, read_png(folder / f"{name}.png"))) for name in ("principled_base_color", "opacity"))
     for c in range(3):
-        values = [linear(x) for row in rows for x in row[c::3]]
+        values = [linear(x) * (o / 255 if front["alpha"]["texture"] else 1) for x, o in zip(rows[c::3], cover[::3])]
         assert sum(values) / len(values) == pytest.approx(principled["base_color"][c], rel=0.03, abs=0.003)
 
 
@@ -320,9 +320,9 @@ def test_textures_of_a_tile(results):
     export, folder = conversion_of(results, "textures"), results / "export" / "textures"
     (material,) = export["materials"]
     assert sorted(p.name for p in folder.iterdir()) == sorted([
-        "conversion.json", "cloth.mtlx", "cloth.u3m", "cloth.u3ma", "cloth.usda", "maps.exr", "preview.png", "height.png", *(f"{n}.png" for n in (
-            "base_color", "principled_base_color", "principled_roughness", "principled_anisotropy", "transmission", "normal", "roughness", "anisotropy",
-            "anisotropy_rotation", "reflected"))])
+        "conversion.json", "cloth.mtlx", "cloth.u3m", "cloth.u3ma", "cloth.usda", "maps.exr", *(f"{n}.png" for n in (
+            "preview", "height", "opacity", "base_color", "principled_base_color", "principled_roughness", "principled_anisotropy", "transmission",
+            "normal", "roughness", "anisotropy", "anisotropy_rotation", "reflected"))])
     assert json.loads(by_python("pxr", os.path.join(SUPPORT, "exports", "usd_check.py"), folder / "cloth.usda")) == [[]]
     for c in range(3):
         mean = [linear(x) for row in read_png(folder / "reflected.png") for x in row[c::3]]
@@ -347,5 +347,5 @@ def test_textures_of_a_tile(results):
     found = json.loads(by_python("MaterialX", os.path.join(ROOT, "tests", "support", "python", "materialx_document.py"), folder / "cloth.mtlx"))
     assert found["valid"], found["why"]
     assert found["surface"] == "ND_open_pbr_surface_surfaceshader" and found["unknown"] == found["undefined"] == [] and found["materials"] == ["cloth"]
-    assert all((folder / f).exists() for f in found["files"]) and len(found["files"]) == 6
+    assert all((folder / f).exists() for f in found["files"]) and len(found["files"]) == 6 + (material["opacity"] < 0.995)
     assert found["weight"] == pytest.approx(material["specular_weight"], rel=1e-5) and 1 <= material["specular_ior"]
