@@ -4,8 +4,9 @@
 #include <string.h>
 
 enum { N_THETA = 16, N_PHI = 16, N_START = 2 };
-/* F0, BASE and SHEEN for three channels: F0 as shares of F90, BASE relative to the albedo. ANISOTROPY: square of its
- * strength, on which the width of the lobe depends; below 0 the lobe is wide along most fibers. */
+/* F0 and BASE for three channels: F0 as shares of F90, BASE relative to the albedo. ANISOTROPY: square of its strength,
+ * on which the width of the lobe depends; below 0 the lobe is wide along most fibers. SHEEN has the hue of the albedo
+ * or none: no row shows it where it is brightest, so that a hue of its own could be any. */
 enum {
     F0,
     F90 = F0 + 3,
@@ -13,7 +14,8 @@ enum {
     ANISOTROPY,
     BASE,
     SHEEN = BASE + 3,
-    SHEEN_ROUGHNESS = SHEEN + 3,
+    SHEEN_TINT,
+    SHEEN_ROUGHNESS,
     COAT,
     COAT_ROUGHNESS,
     NORMAL_SCALE,
@@ -22,12 +24,11 @@ enum {
 /* Below this roughness viewers show no highlight of a lamp without size. */
 static const double least_roughness = 0.05, least_cosine = 1e-3;
 static const double coat_straight = 0.04; /* share of light from straight that a clear coat of glTF reflects */
-static const double lower[N_UNKNOWN] = {0.0, 0.0, 0.0, 1e-3, 0.2, -1.0, 0.0, 0.0,
-                                        0.0, 0.0, 0.0, 0.0,  0.1, 0.0,  0.1, 0.3},
-                    upper[N_UNKNOWN] = {0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 1.5, 1.5, 1.5, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.5};
+static const double lower[N_UNKNOWN] = {0.0, 0.0, 0.0, 1e-3, 0.2, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3, 0.0, 0.1, 0.3},
+                    upper[N_UNKNOWN] = {0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 1.5, 1.5, 1.5, 1.0, 1.0, 1.0, 1.0, 1.0, 2.5};
 static const double start[N_START][TEXTURE_MAX_UNKNOWN] = {
-    {0.07, 0.07, 0.07, 0.9, 0.42, 0.63, 0.25, 0.25, 0.25, 0.05, 0.05, 0.05, 0.5, 0.02, 0.5, 1.0},
-    {0.02, 0.02, 0.02, 0.2, 0.9, -0.2, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1, 0.7, 0.6, 0.5, 1.0}};
+    {0.07, 0.07, 0.07, 0.9, 0.42, 0.63, 0.25, 0.25, 0.25, 0.05, 0.7, 0.5, 0.02, 0.5, 1.0},
+    {0.02, 0.02, 0.02, 0.2, 0.9, -0.2, 0.5, 0.5, 0.5, 0.1, 0.7, 0.7, 0.6, 0.5, 1.0}};
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -147,6 +148,7 @@ void gltf_surface_reflect(const void *surface, const struct texture_sample *s, c
 static void take(void *surface, const double *x)
 {
     struct gltf_surface *g = surface;
+    const double bright = fmax(largest(g->means.albedo), 1e-6);
     g->f90 = x[F90];
     g->roughness = x[ROUGHNESS];
     g->anisotropy = sqrt(fabs(x[ANISOTROPY]));
@@ -154,7 +156,7 @@ static void take(void *surface, const double *x)
     for (int c = 0; c < 3; c++) {
         g->f0[c] = x[F0 + c] * x[F90]; /* an extension has the factor f90 for both */
         g->base[c] = fmin(x[BASE + c] * g->means.albedo[c], 1.0);
-        g->sheen[c] = x[SHEEN + c];
+        g->sheen[c] = x[SHEEN] * (1.0 - x[SHEEN_TINT] * (1.0 - g->means.albedo[c] / bright));
     }
     g->coat = x[COAT];
     g->coat_roughness = x[COAT_ROUGHNESS];
