@@ -87,7 +87,7 @@ static void add_environment(const struct run *r, const double p_mm[3], const flo
 }
 
 /* Points of a rank-1 lattice, shifted at random for each field. */
-static void light_field(const struct run *r, size_t x, size_t y, float rgb[3])
+static void light_field(const struct run *r, size_t x, size_t y, float rgb[FIELD_CHANNELS])
 {
     const struct rng_key key = {r->q->seed, ITERATION_OF_FIELDS, REPLICA, r->q->stream};
     const double xy[2] = {((double)x + 0.5) / (double)r->light.width, ((double)y + 0.5) / (double)r->light.height};
