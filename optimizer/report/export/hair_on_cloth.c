@@ -25,7 +25,7 @@ static const double least_budget = 1e6, most_budget = 2e6, traced_share = 0.35, 
 static const double weight_of_rows = 2.0;
 enum { MOST_FITTED_ROWS = 64 };
 /* How many times as long as a path of a photograph a path with this model takes: on a twill. */
-static const double path_of_mixture = 1.6;
+static const double path_of_mixture = 1.6, mean_fits = 1.5; /* fit_from_starts */
 
 struct on_cloth {
     struct export_scene *e;
@@ -46,7 +46,7 @@ static double budget_of(double n_fit_path)
 
 double hair_on_cloth_paths(double n_fit_path)
 {
-    return path_of_mixture * (1.0 + traced_share + judged_share + judged_row_share) * budget_of(n_fit_path);
+    return path_of_mixture * (mean_fits + traced_share + judged_share + judged_row_share) * budget_of(n_fit_path);
 }
 
 static struct estimate_request request_of(const struct on_cloth *f, const struct configuration *c, size_t n)
@@ -149,17 +149,19 @@ static status add_fitted_rows(struct on_cloth *f, struct error *err)
 /* ---- parameters ---- */
 
 /* A second material that hardly takes part has hardly any derivatives, and the fit ends beside it: a cloth of dark
- * fibers came to 15 % of error so, and to 8 % from here. The rarer material starts as a rough copy of the other one. */
-static void spread_start(double *param)
+ * fibers came to 15 % of error so, and to 8 % from here. The rarer material starts as a rough copy of the other one.
+ * Returns whether there was one. */
+static bool spread_start(double *param)
 {
     const double least_share = 0.2, start_share = 0.25, along = 0.6, around = 0.7;
     const bool first_is_rare = param[P_SHARE] > 0.5;
     double *rare = param + (first_is_rare ? 0 : N_OF_MATERIAL);
-    if (param[P_SHARE] >= least_share && param[P_SHARE] <= 1.0 - least_share) return;
+    if (param[P_SHARE] >= least_share && param[P_SHARE] <= 1.0 - least_share) return false;
     memcpy(rare, param + (first_is_rare ? N_OF_MATERIAL : 0), N_OF_MATERIAL * sizeof *param);
     rare[P_ALONG] = along;
     rare[P_AROUND] = around;
     param[P_SHARE] = first_is_rare ? 1.0 - start_share : start_share;
+    return true;
 }
 
 static void param_of(const struct hair_blend *b, const struct param_info *info, double *param)
@@ -173,7 +175,6 @@ static void param_of(const struct hair_blend *b, const struct param_info *info, 
         own[P_AROUND] = l->azimuthal_roughness;
     }
     param[P_SHARE] = b->second_share;
-    spread_start(param);
     for (size_t p = 0; p < N_OF_MIXTURE; p++) { /* the fit moves none that stands at a bound */
         const double inside = 1e-3 * (info[p].upper - info[p].lower);
         param[p] = fmin(fmax(param[p], info[p].lower + inside), info[p].upper - inside);
@@ -246,6 +247,25 @@ static status fit(struct on_cloth *f, const double part[2], struct error *err)
     return s;
 }
 
+/* Fits from the mixtures of single fibers and, where one of them has a rare material, once more from spread ones. The
+ * lower objective over the fitted directions and rows counts. */
+static status fit_from_starts(struct on_cloth *f, const double part[2], struct error *err)
+{
+    const double middle = 0.5 * (part[0] + part[1]), first[2] = {part[0], middle}, second[2] = {middle, part[1]};
+    double spread[FIT_MAX_PARAM], best[FIT_MAX_PARAM];
+    bool is_rare = false;
+    memcpy(spread, f->param, sizeof spread);
+    for (size_t g = 0; g < f->sets.n_set; g++) is_rare |= spread_start(spread + g * N_OF_MIXTURE);
+    status s = fit(f, is_rare ? first : part, err);
+    if (s != STATUS_OK || !is_rare) return s;
+    const double lowest = f->result.objective.value;
+    memcpy(best, f->param, sizeof best);
+    memcpy(f->param, spread, sizeof spread);
+    s = fit(f, second, err);
+    if (s == STATUS_OK && lowest < f->result.objective.value) memcpy(f->param, best, sizeof best);
+    return s;
+}
+
 /* Fits, and judges between the fitted directions and over the rows. */
 static status fit_and_judge(struct on_cloth *f, double from, double to, struct error *err)
 {
@@ -254,7 +274,7 @@ static status fit_and_judge(struct on_cloth *f, double from, double to, struct e
     struct hair_error *error = &f->e->hair_error;
     status s = trace_fitted_cloth(f, &at[0], err);
     if (s == STATUS_OK) s = add_fitted_rows(f, err);
-    if (s == STATUS_OK) s = fit(f, &at[1], err);
+    if (s == STATUS_OK) s = fit_from_starts(f, &at[1], err);
     if (s == STATUS_OK) s = judge(f, &f->between, judged_share, &at[2], &between, NULL, err);
     if (s == STATUS_OK) s = judge(f, &f->rows, judged_row_share, &at[3], &rows, error->row_rel_error, err);
     if (s != STATUS_OK) return s;
