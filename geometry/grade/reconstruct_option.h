@@ -26,6 +26,7 @@ struct reconstruct_option {
     /* Whether lumens are filled when the volume is read (lumen_filter.h): 0, 1, or -1 (default) where the evidence is
      * clear; the decision is written back. */
     int hollow_fibers;
+    bool three_subvolumes;       /* as published, in place of nine that overlap (slice_frame.h) */
     double fiber_diameter_voxel; /* typical diameter, from which scales and reaches follow */
     double s, t;                 /* filter widths, per square voxel (thesis Table 5.2) */
     size_t h;                    /* edge of the filter's cube, voxels */

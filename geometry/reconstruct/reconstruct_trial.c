@@ -70,6 +70,7 @@ static struct reconstruct_option options_of(const struct reconstruct_option *job
     o.fiber_diameter_voxel = job->fiber_diameter_voxel;
     o.link_sigma_voxel = job->link_sigma_voxel;
     o.min_vertex = job->min_vertex;
+    o.three_subvolumes = job->three_subvolumes;
     o.radius_rule = job->radius_rule;
     o.hollow_fibers = report->lumen_share > 0.0;
     return o;

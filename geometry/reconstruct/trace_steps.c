@@ -29,16 +29,17 @@ static int frame_axis(const struct slice_frame *f)
 
 status trace_chains(struct trace_job *job, struct polyline_set *chains, struct error *err)
 {
+    const int n_frame = job->o->three_subvolumes ? 3 : N_SLICE_FRAME;
     struct subvolumes sub;
-    status s = subvolumes_init(&sub, job->d, job->pool, err);
+    status s = subvolumes_init(&sub, job->d, job->o->three_subvolumes, job->pool, err);
     memcpy(job->report->n_class_voxel, sub.n_class_voxel, sizeof sub.n_class_voxel);
     for (int a = 0; a < 3; a++) job->report->n_center[a] = job->report->n_chain[a] = 0;
-    for (int i = 0; i < N_SLICE_FRAME && s == STATUS_OK; i++) {
+    for (int i = 0; i < n_frame && s == STATUS_OK; i++) {
         struct center_list list = {0};
         struct slice_frame frame;
         size_t n_chain = 0;
         slice_frame_init(&frame, i, job->v->n);
-        trace_enter_part(job, 0.12 * i / N_SLICE_FRAME, 0.12 * (i + 1) / N_SLICE_FRAME);
+        trace_enter_part(job, 0.12 * i / n_frame, 0.12 * (i + 1) / n_frame);
         const struct center_search search = {job->v, job->d, &sub, &frame, job->diameter};
         s = centers_detect(&search, job->pool, &job->inner, &list, err);
         if (s != STATUS_OK) break;

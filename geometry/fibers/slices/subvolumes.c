@@ -1,7 +1,6 @@
 #include "geometry/fibers/slices/subvolumes.h"
 
 #include <math.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,6 +11,7 @@ struct slice_count {
 
 struct mask_job {
     const struct direction_volume *d;
+    bool disjoint;
     uint16_t *mask;
     float normal[N_SLICE_FRAME][3];
     struct slice_count *count;
@@ -43,7 +43,7 @@ static void mask_slice(void *context, size_t k, size_t i_thread)
             int nearest = 0;
             for (int a = 1; a < 3; a++)
                 if (fabsf(d[a]) > fabsf(d[nearest])) nearest = a;
-            job->mask[at] = (uint16_t)(1u << (12 + nearest) | frames_of(job, d));
+            job->mask[at] = (uint16_t)(1u << (12 + nearest) | (job->disjoint ? 1u << nearest : frames_of(job, d)));
             c.n[nearest]++;
             for (int a = 0; a < 2; a++) {
                 c.from[a] = x[a] < c.from[a] ? x[a] : c.from[a];
@@ -94,7 +94,7 @@ static void reduce(struct subvolumes *s, const struct mask_job *job)
         if (s->from[a] > s->to[a]) s->from[a] = s->to[a];
 }
 
-status subvolumes_init(struct subvolumes *s, const struct direction_volume *d, struct thread_pool *pool,
+status subvolumes_init(struct subvolumes *s, const struct direction_volume *d, bool disjoint, struct thread_pool *pool,
                        struct error *err)
 {
     void *mask;
@@ -102,7 +102,7 @@ status subvolumes_init(struct subvolumes *s, const struct direction_volume *d, s
     status st = scratch_new(d->space, volume_n_voxel(d->n) * sizeof *s->mask, "the axes of voxels", &mask, err);
     s->mask = mask;
     if (st != STATUS_OK) return st;
-    struct mask_job job = {.d = d, .mask = s->mask, .count = calloc(d->n[2], sizeof *job.count)};
+    struct mask_job job = {.d = d, .disjoint = disjoint, .mask = s->mask, .count = calloc(d->n[2], sizeof *job.count)};
     if (job.count == NULL) {
         subvolumes_release(s);
         return error_set(err, STATUS_NO_MEMORY, "cannot separate the axes: out of memory");

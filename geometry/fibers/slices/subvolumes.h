@@ -6,6 +6,8 @@
 #include "geometry/fibers/slices/slice_frame.h"
 #include "geometry/volume/volume.h"
 
+#include <stdbool.h>
+
 /* Cosine of the largest angle between a voxel's direction and the normal of its slices, 39.6 degrees. */
 #define CLASS_COSINE 0.77f
 
@@ -20,8 +22,9 @@ struct subvolumes {
     struct scratch_space *space;
 };
 
-/* STATUS_NO_MEMORY, STATUS_DISK_FULL. */
-status subvolumes_init(struct subvolumes *s, const struct direction_volume *d, struct thread_pool *pool,
+/* disjoint: each voxel belongs to the frame of its nearest axis alone, one of the first three (fabric thesis, 5.6.1).
+ * STATUS_NO_MEMORY, STATUS_DISK_FULL. */
+status subvolumes_init(struct subvolumes *s, const struct direction_volume *d, bool disjoint, struct thread_pool *pool,
                        struct error *err);
 void subvolumes_release(struct subvolumes *s);
 

@@ -27,7 +27,7 @@ struct job_scan {
     size_t crop_voxel[6];
     bool align, crop; /* true for "auto"; false where matrix or crop_voxel is given */
     double crop_keep;
-    bool join_seams, transfer_directions, unresolved_fibers, trial;
+    bool join_seams, transfer_directions, three_subvolumes, unresolved_fibers, trial;
     int hollow_fibers;           /* 0, 1, or -1: decided from the scan */
     double fiber_diameter_voxel; /* NaN: measured */
     double density_low, density_high, filter_s, filter_t, filter_eps_d, filter_eps_j;

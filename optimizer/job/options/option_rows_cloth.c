@@ -191,12 +191,16 @@ const struct job_option option_rows_cloth[] = {
      .standard = "true",
      .meaning = "Yarns and fibers that are cut at a face of the tile are joined to those of the opposite face: a "
                 "smooth warp, then ends within six radii."},
+    {.path = "volume.three_subvolumes",
+     .kind = OPTION_BOOL,
+     INTO(scan, three_subvolumes),
+     .standard = "false",
+     .meaning = "Whether centers are sought in three disjoint subvolumes, as published (5.6.1), not in nine."},
     {.path = "volume.transfer_directions",
      .kind = OPTION_BOOL,
      INTO(scan, transfer_directions),
      .standard = "true",
-     .meaning = "Whether voxels take directions and densities from the fibers (fabric thesis, 5.6.7). `false` keeps "
-                "the filter's, for comparison."},
+     .meaning = "Whether voxels take directions and densities from the fibers (fabric thesis, 5.6.7)."},
     {.path = "volume.unresolved_fibers",
      .kind = OPTION_BOOL,
      INTO(scan, unresolved_fibers),

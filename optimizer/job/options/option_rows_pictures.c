@@ -31,10 +31,9 @@ const struct job_option option_rows_pictures[] = {
      .items = "pictures",
      .meaning =
          "Pictures of the fitted cloth laid on a surface (docs/bent-cloth.md), in the folder `pictures` of the "
-         "results. They show the best model. Without `photographs` and `measurements` "
-         "nothing is fitted: they show `fit.model` with `fit.fixed`, which then names every parameter. After the "
-         "result of a job with a cloth the service makes a picture in the studio, pictures/hero.png, and the "
-         "twin, while no job waits; `none` leaves them out."},
+         "results, by the best model. Without `photographs` and `measurements` nothing is fitted: they show "
+         "`fit.model` with `fit.fixed`, which then names every parameter. `none`: also without pictures/hero.png and "
+         "the twin, which the service makes after a result."},
     {.path = "pictures[].kind",
      .kind = OPTION_CHOICE,
      OF_PICTURE(kind),

@@ -33,6 +33,7 @@ void volume_options(const struct job_scan *scan, struct reconstruct_option *o)
     o->density_high = scan->density_high;
     o->fiber_diameter_voxel = scan->fiber_diameter_voxel;
     o->hollow_fibers = scan->hollow_fibers;
+    o->three_subvolumes = scan->three_subvolumes;
     if (!isnan(scan->filter_s)) o->s = scan->filter_s;
     if (!isnan(scan->filter_t)) o->t = scan->filter_t;
     if (scan->filter_h > 0) o->h = scan->filter_h;

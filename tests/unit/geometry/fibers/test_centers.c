@@ -39,7 +39,7 @@ static void leaning_init(struct leaning *x, int i_frame)
         x->d.density[i] = x->v.density[i] > 0.3f ? 200 : 0;
         direction_volume_set(&x->d, i, along);
     }
-    assert_int_equal(subvolumes_init(&x->sub, &x->d, NULL, NULL), STATUS_OK);
+    assert_int_equal(subvolumes_init(&x->sub, &x->d, false, NULL, NULL), STATUS_OK);
 }
 
 static void leaning_release(struct leaning *x)

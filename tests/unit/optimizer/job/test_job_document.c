@@ -158,15 +158,16 @@ static void test_volume(void **state)
 static void test_alignment(void **state)
 {
     (void)state;
-    struct job_document *d = job_document_of_text(VOLUME_OF(
-        "\"align\":\"auto\",\"crop\":\"auto\",\"crop_keep\":0.3,\"join_seams\":false,\"transfer_directions\":false"));
+    struct job_document *d =
+        job_document_of_text(VOLUME_OF("\"align\":\"auto\",\"crop\":\"auto\",\"crop_keep\":0.3,\"join_seams\":false,"
+                                       "\"transfer_directions\":false,\"three_subvolumes\":true"));
     assert_true(d->scan->align && d->scan->crop && d->scan->crop_keep == 0.3 && !d->scan->join_seams);
-    assert_true(!d->scan->transfer_directions);
+    assert_true(!d->scan->transfer_directions && d->scan->three_subvolumes);
     job_document_free(d);
     d = job_document_of_text(
         VOLUME_OF("\"align\":\"auto\",\"crop\":\"auto\",\"matrix\":[1,0,0,0,1,0,0,0,1],\"crop_voxel\":[0,0,0,9,9,9]"));
     assert_true(!d->scan->align && !d->scan->crop && d->scan->join_seams && d->scan->transfer_directions &&
-                isnan(d->scan->crop_keep));
+                !d->scan->three_subvolumes && isnan(d->scan->crop_keep));
     job_document_free(d);
     job_document_check_error(VOLUME_OF("\"align\":\"yes\""), "volume.align", "auto");
     job_document_check_error(VOLUME_OF("\"crop\":true"), "volume.crop", "none, auto");
