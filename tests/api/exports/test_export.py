@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 from daemon_under_test import ROOT, problem, program
-from small_cloth import start_small_job
+from small_cloth import TABLE, start_small_job
 
 pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
 FIT = {"path_budget": 20000, "render_px": 8, "render_samples": 1}
@@ -71,9 +71,16 @@ def test_the_plug_ins_for_mitsuba_scatter_as_the_models_do():
 
 @pytest.mark.slow
 def test_what_the_scene_lacks_is_said(real):
-    """A square of 40 cm shows more of this small tile than is written."""
-    result = real.wait_state(start_small_job(real, {**document(), "camera": {"crop_cm": 40}}), "succeeded", timeout_s=400)["result"]
+    """A square of 40 cm shows more of this small tile than is written, and the plug-in does not see flat sections turn."""
+    wanted = {**document(model="textile.v3"), "camera": {"crop_cm": 40},
+              "cloth": {"weave": "plain", "tile_warps": 2, "tile_wefts": 2, "yarns": [{"fibers": 6, "fiber_flatness": 2}]}}
+    job = real.create({k: v for k, v in wanted.items() if k != "fibers"})
+    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    assert real.post(f"/v1/jobs/{job}/start").status_code == 202
+    result = real.wait_state(job, "succeeded", timeout_s=400)["result"]
     assert [w for w in result["warnings"] if "repeats of the tile" in w] and len(result["exports"]) == 1
+    for warnings in (result["warnings"], result["exports"][0]["warnings"]):
+        assert [w for w in warnings if "takes the flat sections" in w], warnings
 
 
 def test_a_volume_model_is_not_exported(real):
