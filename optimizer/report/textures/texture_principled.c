@@ -18,7 +18,7 @@ enum {
  * to this part. */
 static const double least_gain = 0.9;
 /* Least part of the reflected light that the base keeps: without it the maps of dark cloths would be black. */
-#define LEAST_BASE 0.1
+#define LEAST_BASE 0.05
 static const double lower[N_UNKNOWN] = {0.0, 0.3, 0.0, LEAST_BASE, LEAST_BASE, LEAST_BASE, 0.0, 0.0, 0.2},
                     upper[N_UNKNOWN] = {1.0, 1.0, 1.0, 1.5, 1.5, 1.5, 3.0, 1.0, 2.5};
 static const double start[N_START][TEXTURE_MAX_UNKNOWN] = {{0.5, 0.8, 0.1, 0.7, 0.7, 0.7, 0.8, 0.5, 1.0},
