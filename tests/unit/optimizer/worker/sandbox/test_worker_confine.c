@@ -35,21 +35,29 @@ static void test_modes(void **state)
     }
 }
 
-/* The descriptor of the helper for report.pdf is closed in programs that the worker executes. */
+/* The descriptors of the helpers for other programs are closed in programs that the worker executes. */
 static void test_the_state_of_the_program(void **state)
 {
     (void)state;
     struct confinement c;
     char text[40];
-    int fd = open("/dev/null", O_RDONLY);
-    assert_int_equal(fcntl(fd, F_GETFD), 0);
-    snprintf(text, sizeof text, "7,1234,%d", fd);
+    int fd[2];
+    for (int i = 0; i < 2; i++) {
+        fd[i] = open("/dev/null", O_RDONLY);
+        assert_int_equal(fcntl(fd[i], F_GETFD), 0);
+    }
+    snprintf(text, sizeof text, "7,1234,%d,56,%d", fd[0], fd[1]);
     assert_true(confinement_parse(text, &c));
-    assert_true(c.executed && c.files_version == 7 && c.pdf.pid == 1234 && c.pdf.order_fd == fd && !c.calls);
-    assert_int_equal(fcntl(fd, F_GETFD), FD_CLOEXEC);
-    close(fd);
-    assert_true(confinement_parse("0,-1,-1", &c) && c.files_version == 0 && c.pdf.order_fd == -1);
-    static const char *const bad[] = {"", "7", "7,1234", "7,1234,", "x,1,2"};
+    assert_true(c.executed && c.files_version == 7 && !c.calls);
+    assert_true(c.helper.pdf.pid == 1234 && c.helper.pdf.order_fd == fd[0]);
+    assert_true(c.helper.blend.pid == 56 && c.helper.blend.order_fd == fd[1]);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(fcntl(fd[i], F_GETFD), FD_CLOEXEC);
+        close(fd[i]);
+    }
+    assert_true(confinement_parse("0,-1,-1,-1,-1", &c) && c.files_version == 0);
+    assert_true(c.helper.pdf.order_fd == -1 && c.helper.blend.order_fd == -1);
+    static const char *const bad[] = {"", "7", "7,1234", "7,1234,5", "7,1234,5,6,", "x,1,2,3,4"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) assert_false(confinement_parse(bad[i], &c));
 }
 
