@@ -114,6 +114,14 @@ static void name_sample(const char *sample, const json_t *wanted, char name[NAME
     snprintf(name, NAME_BYTES, "%.100s%.90s", before, after);
 }
 
+/* What the cloth is, for exports. */
+static void copy_label(const json_t *from, json_t *to)
+{
+    static const char *const key[] = {"composition", "weight_g_m2"};
+    for (size_t i = 0; i < sizeof key / sizeof *key; i++)
+        if (json_object_get(from, key[i]) != NULL) json_object_set(to, key[i], json_object_get(from, key[i]));
+}
+
 static status find_files(const json_t *from, const json_t *document, struct derived_files *files, struct error *err)
 {
     const json_t *own = json_object_get(from, "environment"), *light_of = json_object_get(document, "environment");
@@ -158,6 +166,7 @@ status derived_document_make(const json_t *document, const json_t *result, const
     json_decref(groups);
     if (d == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the job document: out of memory");
     copy_light(document, wanted, d);
+    copy_label(document, d);
     for (size_t i = 0; i < N_SHOWN; i++)
         if (json_object_get(wanted, shown[i]) != NULL) json_object_set(d, shown[i], json_object_get(wanted, shown[i]));
     s = find_files(document, d, files, err);

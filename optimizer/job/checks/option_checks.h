@@ -23,6 +23,7 @@ struct option_value {
 
 status job_check_document(const struct option_value *v, struct error *err);
 status job_check_sample(const struct option_value *v, struct error *err);
+status job_check_composition(const struct option_value *v, struct error *err);
 /* the cloth */
 /* Refuses ids that could leave the folder of the jobs; of any option that is the id of a job. */
 status job_check_job_id(const struct option_value *v, struct error *err);

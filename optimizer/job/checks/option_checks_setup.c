@@ -1,6 +1,7 @@
 /* Checks of the set-up, of the measurements, and of the document as a whole. */
 #include "base/catalogue/model_catalogue.h"
 #include "optimizer/job/checks/option_checks.h"
+#include "optimizer/job/document/fiber_composition.h"
 #include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_photograph.h"
@@ -23,6 +24,14 @@ status job_check_sample(const struct option_value *v, struct error *err)
     if (n > 200)
         return error_set_field(err, STATUS_INVALID, v->path, "'sample' has %zu characters: allowed are 1 to 200", n);
     return STATUS_OK;
+}
+
+status job_check_composition(const struct option_value *v, struct error *err)
+{
+    struct fiber_composition unused;
+    struct error why = {0};
+    if (fiber_composition_read(v->section->cloth->composition, &unused, &why) == STATUS_OK) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, v->path, "'%s': %s", v->path, why.text);
 }
 
 status job_check_job_id(const struct option_value *v, struct error *err)

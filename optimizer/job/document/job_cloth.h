@@ -18,7 +18,9 @@ struct job_cloth_yarn {
 };
 
 struct job_cloth {
-    char sample[JOB_MAX_SAMPLE_BYTES]; /* name of the cloth for people */
+    char sample[JOB_MAX_SAMPLE_BYTES];    /* name of the cloth for people */
+    char composition[JOB_MAX_NAME_BYTES]; /* fiber_composition.h; "": not given */
+    double weight_g_m2;                   /* NaN: not given */
     char fiber_file[JOB_MAX_NAME_BYTES];
     double fiber_radius_um; /* of fiber files that state none; NaN: not given */
     double tile_mm[2];      /* NaN: from the file */

@@ -199,5 +199,19 @@ const struct job_option option_rows_described[] = {
          "measurements ask for and what they gain (docs/scanned-cloth.md)."},
 #include "base/catalogue/correction_numbers.def"
 #undef CORRECTION_NUMBER
+    {.path = "composition",
+     .kind = OPTION_TEXT,
+     TEXT_INTO(cloth, composition),
+     .check = job_check_composition,
+     .left_out = "not known",
+     .allowed = "percentages that sum to 100",
+     .meaning = "Fibers for exports: `60 % cotton, 40 % polyester`."},
+    {.path = "weight_g_m2",
+     .kind = OPTION_NUMBER,
+     INTO(cloth, weight_g_m2),
+     RANGE(1, 10000),
+     .unit = "g/m2",
+     .left_out = "not known",
+     .meaning = "Weight for exports."},
     {.path = NULL},
 };

@@ -1,10 +1,12 @@
 /* results/export/gltf/: the fitted cloth as glTF 2.0 binary files, drape.glb and sphere.glb: a draped piece and a ball,
  * with textures of one tile that repeat in true size (gltf_material.h). Metres. rows.csv as of the other formats. */
+#include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/report/textures/gltf_material.h"
 #include "optimizer/report/textures/gltf_mesh.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -23,9 +25,14 @@ struct gltf {
 static json_t *extras_json(const struct gltf *f)
 {
     const struct export_scene *e = f->e;
-    return json_pack("{s:s, s:s, s:o, s:f, s:o}", "sample", e->report->in.sample, "model",
-                     e->model->setup->appearance.id, "tile_mm", json_number_list(f->tile_mm, 2, 1.0), "thickness_mm",
-                     mm * (e->z_high_m - e->z_low_m), "row_rel_rms", json_number(f->surface.error.row_rel_rms));
+    json_t *json =
+        json_pack("{s:s, s:s, s:o, s:f, s:o}", "sample", e->report->in.sample, "model", e->model->setup->appearance.id,
+                  "tile_mm", json_number_list(f->tile_mm, 2, 1.0), "thickness_mm", mm * (e->z_high_m - e->z_low_m),
+                  "row_rel_rms", json_number(f->surface.error.row_rel_rms));
+    const struct job_cloth *cloth = e->report->in.job->cloth;
+    if (cloth->composition[0] != '\0') json_object_set_new(json, "composition", json_string(cloth->composition));
+    if (!isnan(cloth->weight_g_m2)) json_object_set_new(json, "weight_g_m2", json_real(cloth->weight_g_m2));
+    return json;
 }
 
 static json_t *primitive_json(const struct gltf_mesh *m, struct glb_file *file)

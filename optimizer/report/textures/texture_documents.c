@@ -1,11 +1,13 @@
 #include "optimizer/report/textures/texture_documents.h"
 
+#include "optimizer/job/document/fiber_composition.h"
 #include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/json_number.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <time.h>
 
 static const double mm_per_inch = 25.4;
@@ -267,6 +269,35 @@ static json_t *woven_json(const struct export_scene *e)
     return cloth->description != NULL ? json_pack("{s:s, s:n}", "type", "Woven", "name") : json_null();
 }
 
+/* Fibers whose names are in U3M's list, in any case of letters, and others by their name. */
+static json_t *composition_json(const struct export_scene *e)
+{
+    static const char *const word[] = {"Acetate",      "Acrylic", "Alpaca",   "Angora", "Aramid",  "Cashmere",
+                                       "Cotton",       "Cupro",   "Elastane", "Hemp",   "Jute",    "Linen",
+                                       "Lycra",        "Lyocell", "Modal",    "Mohair", "Nylon",   "Polyester",
+                                       "Polyethylene", "Ramie",   "Rayon",    "Silk",   "Spandex", "Wool"};
+    struct fiber_composition c;
+    if (fiber_composition_read(e->report->in.job->cloth->composition, &c, NULL) != STATUS_OK || c.n_part == 0)
+        return json_null();
+    json_t *parts = json_array();
+    for (size_t i = 0; i < c.n_part; i++) {
+        const char *known = NULL;
+        for (size_t k = 0; k < sizeof word / sizeof *word; k++)
+            if (strcasecmp(word[k], c.part[i].name) == 0) known = word[k];
+        json_array_append_new(parts, known != NULL
+                                         ? json_pack("{s:f, s:s, s:n}", "ratio", c.part[i].share, "type", known, "name")
+                                         : json_pack("{s:f, s:s, s:s}", "ratio", c.part[i].share, "type", "other",
+                                                     "name", c.part[i].name));
+    }
+    return json_pack("{s:o}", "parts", parts);
+}
+
+static json_t *weight_json(const struct export_scene *e)
+{
+    const double weight = e->report->in.job->cloth->weight_g_m2;
+    return isnan(weight) ? json_null() : json_real(weight);
+}
+
 static json_t *construction_json(const struct export_scene *e)
 {
     static const char *const word[][2] = {{"plain", "Plain weave"}, {"twill", "Twill"}, {"satin", "Satin"}};
@@ -293,11 +324,12 @@ static json_t *u3m_json(const struct export_scene *e, const struct texture_princ
     if (gmtime_r(&clock, &utc) != NULL) strftime(now, sizeof now, "%Y-%m-%dT%H:%M:%SZ", &utc);
     make_uuid(e, uuid);
     return json_pack(
-        "{s:s, s:{s:s, s:s, s:s, s:s, s:s, s:o, s:n, s:n, s:{s:f, s:n, s:n, s:{s:s}, s:o, s:o}, s:n}, s:n}", "schema",
+        "{s:s, s:{s:s, s:s, s:s, s:s, s:s, s:o, s:n, s:n, s:{s:f, s:o, s:o, s:{s:s}, s:o, s:o}, s:n}, s:n}", "schema",
         "1.1", "material", "id", uuid, "name", e->report->in.sample[0] != '\0' ? e->report->in.sample : "cloth",
         "description", "Made by Selvedge.", "created", now, "modified", now, "front", front_json(e, p), "back", "side",
-        "physics", "thickness", 1e3 * (e->z_high_m - e->z_low_m), "weight", "composition", "devices", "fab", "null",
-        "material_type", woven_json(e), "construction", construction_json(e), "metadata", "custom");
+        "physics", "thickness", 1e3 * (e->z_high_m - e->z_low_m), "weight", weight_json(e), "composition",
+        composition_json(e), "devices", "fab", "null", "material_type", woven_json(e), "construction",
+        construction_json(e), "metadata", "custom");
 }
 
 status texture_u3m_write(const struct export_scene *e, const struct texture_principled *p, struct error *err)

@@ -15,7 +15,7 @@ sys.path.insert(0, os.path.join(ROOT, "clients", "python"))
 import selvedge  # noqa: E402
 
 pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
-DOCUMENT = {"sample": "blue twill", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"}, "camera": {"crop_cm": 0.1},
+DOCUMENT = {"sample": "blue twill", "weight_g_m2": 90, "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"}, "camera": {"crop_cm": 0.1},
             "fit": {"path_budget": 20000, "render_px": 8, "render_samples": 1, "model": "two_lobe.v1"},
             "export": {"blender": True, "mitsuba": True}}
 VIEW = {"light_theta_deg": 45, "light_phi_deg": 0, "camera_theta_deg": 30, "camera_phi_deg": 180, "px": 16, "samples": 2, "width_mm": 1, "size_mm": 1}
@@ -47,7 +47,7 @@ def test_an_export_made_later_is_the_export_of_the_fit(real, fitted):
     """The scene with its hair, the stated errors, and the rows with measured and rendered radiances: no fit is made again."""
     job = derive(real, fitted, export={"mitsuba": True, "pbrt": True})
     done = real.wait_state(job, "succeeded", timeout_s=400)
-    assert done["sample"] == "blue twill for mitsuba, pbrt" and done["document"]["fit"]["result_file"] == "result.json"
+    assert done["sample"] == "blue twill for mitsuba, pbrt" and done["document"]["weight_g_m2"] == 90 and done["document"]["fit"]["result_file"] == "result.json"
     assert [e["format"] for e in done["result"]["exports"]] == ["mitsuba", "pbrt"] and done["result"]["method"] is None
     assert text_of(real, job, "export/mitsuba/scene.xml") == text_of(real, fitted, "export/mitsuba/scene.xml")
     assert "those of an earlier export" in real.get(f"/v1/jobs/{job}/log").text

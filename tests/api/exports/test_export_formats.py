@@ -36,7 +36,8 @@ def results(tmp_path_factory):
     (folder / "input" / "cloth.hair").write_bytes(hair())
     (folder / "input" / "rows.csv").write_text(TABLE)
     (folder / "job.json").write_text(json.dumps({
-        "sample": "exports", "fibers": {"file": "cloth.hair", "voxel_um": 5}, "measurements": {"file": "rows.csv"}, "fit": FIT,
+        "sample": "exports", "composition": "60 % cotton, 40 % bamboo", "weight_g_m2": 180,
+        "fibers": {"file": "cloth.hair", "voxel_um": 5}, "measurements": {"file": "rows.csv"}, "fit": FIT,
         "export": {**{name: True for name in FORMATS}, "texture_cm": 2, "texture_px": 512}}))
     subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "2", str(folder)], check=True)
     return folder / "results"
@@ -284,6 +285,8 @@ def test_a_u3m_material(results):
         assert not schema.is_valid(changed(u3m, path, value)), path
     m, front = u3m["material"], u3m["material"]["front"]
     assert m["name"] == "exports" and m["back"] is m["side"] is None and m["physics"]["thickness"] > 0
+    assert m["physics"]["weight"] == 180 and m["physics"]["composition"]["parts"] == [
+        {"ratio": 0.6, "type": "Cotton", "name": None}, {"ratio": 0.4, "type": "other", "name": "bamboo"}]
     maps = [v["texture"]["image"] for v in front.values() if isinstance(v, dict) and v.get("texture")]
     assert len(maps) == 7 + (front["alpha"]["texture"] is not None) and front["displacement"]["texture"]["factor"] == pytest.approx(m["physics"]["thickness"])
     check_archive(folder, {i["path"] for i in maps} | {front["preview"]["path"]})

@@ -18,7 +18,7 @@ from gltf_file import GltfFile  # noqa: E402
 image = pytest.importorskip("PIL.Image", reason="python3-pil is not installed")
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 PACKAGES = os.path.join(os.path.dirname(os.path.dirname(program("selvedge-worker"))), "exports-node")
-DOCUMENT = {"sample": "blue twill", "fibers": {"file": "cloth.hair", "voxel_um": 5}, "measurements": {"file": "rows.csv"},
+DOCUMENT = {"sample": "blue twill", "composition": "100 % silk", "fibers": {"file": "cloth.hair", "voxel_um": 5}, "measurements": {"file": "rows.csv"},
             "fit": {"path_budget": 20000, "render_px": 16, "render_samples": 1, "model": "isotropic.v1"}, "export": {"gltf": True}}
 
 
@@ -95,7 +95,7 @@ def test_materials_state_every_factor(export):
     (fitted,) = found["materials"]
     file = GltfFile(folder / "drape.glb")
     asset, (first, second) = file.document["asset"], file.document["materials"]
-    assert asset["version"] == "2.0" and asset["extras"]["sample"] == "blue twill" and asset["extras"]["thickness_mm"] > 0
+    assert asset["version"] == "2.0" and asset["extras"]["sample"] == "blue twill" and asset["extras"]["composition"] == "100 % silk" and asset["extras"]["thickness_mm"] > 0
     for material in (first, second):
         base, more = material["pbrMetallicRoughness"], material["extensions"]
         assert set(base) == {"baseColorFactor", "baseColorTexture", "metallicFactor", "roughnessFactor", "metallicRoughnessTexture"}
