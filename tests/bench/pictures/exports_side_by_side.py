@@ -1,5 +1,6 @@
 """One drape as the job renders it from its fibers, as Mitsuba shows it with the exported U3M maps, and as Blender and three.js show the exported glTF
-file, all under one lamp: exports_side_by_side.py --build DIR --out PICTURE.png. Prints the mean radiance of each over the cloth."""
+file, all under one lamp: exports_side_by_side.py --build DIR --out PICTURE.png. Prints the mean radiance of each over the cloth, and as figures
+exports.drape.<program>.flip the mean FLIP of each other picture against the job's, where the evaluator is or can be installed."""
 import argparse
 import json
 import math
@@ -15,6 +16,7 @@ ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..", "..")
 SUPPORT = os.path.join(ROOT, "tests", "support", "exports")
 sys.path.insert(0, SUPPORT)
 import gltf_viewer  # noqa: E402
+from picture_flip import flip, python_with_flip  # noqa: E402
 
 CLOTH = {"draft": ["110", "101", "011"], "tile_warps": 6, "tile_wefts": 6, "cover_warp": 1.1, "yarns": [{"fibers": 30, "fiber_radius_um": 16.1}]}
 BOUNDS = {"C_TT.r": [0.97, 0.99], "C_TT.g": [0.32, 0.34], "C_TT.b": [0.34, 0.36]}  # the fit ends at these, whatever the rows are
@@ -40,7 +42,8 @@ def make_job(build, folder, px, samples):
         f.write("set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg,r,g,b\n")
         f.writelines(",".join(map(str, ("fit", *row, 0.2, 0.15, 0.1))) + "\n" for row in ROWS)
     document = {"sample": "gabardine", "cloth": CLOTH, "measurements": {"file": "rows.csv"}, "fit": FIT, "lamp": {"kind": "directional"},
-                "camera": {"far_field": True}, "pictures": [{**VIEW, "px": px, "samples": samples}], "export": {"gltf": True, "textures": True}}
+                "camera": {"far_field": True}, "pictures": [{**VIEW, "px": px, "samples": samples, "method": "fast"}],
+                "export": {"gltf": True, "textures": True}}
     with open(os.path.join(folder, "job.json"), "w", encoding="utf-8") as f:
         json.dump(document, f)
     subprocess.run([os.path.join(build, "bin", "selvedge-worker"), "--quiet", folder], check=True, stdout=sys.stderr)
@@ -99,6 +102,9 @@ def main():
         sheet.paste(panel(f"{name}, middle", picture[close, close], exposure, 512), (516 * i, 516))
         print(json.dumps({"picture": name, "mean": [round(float(x), 4) for x in picture[cloth].mean(axis=0)]}))
     sheet.save(arguments.out)
+    reference, *others = [[tuple(pixel) for row in picture[:px, :px].tolist() for pixel in row] for picture in pictures.values()]
+    for name, value in zip(list(pictures)[1:], flip(python_with_flip(build), px, reference, others)):
+        print(json.dumps({"name": f"exports.drape.{name.replace('.', '_')}.flip", "value": round(value, 4), "unit": "1", "better": "lower"}))
 
 
 if __name__ == "__main__":

@@ -217,7 +217,7 @@ static void a_cloth_over_a_plane(void **state)
     struct thread_pool *pool;
     bend(&c, &bent);
     const struct configuration view = view_from_above();
-    struct ground_request q = {bent, &view, ground_below(bent, 8), 100, 0.5, PX, PX, 1024, 3, 0};
+    struct ground_request q = {bent, &view, ground_below(bent, 8), 100, 0.5, NULL, PX, PX, 1024, 3, 0};
     assert_true(q.z_mm < -8 && q.z_mm > -9);
     assert_int_equal(thread_pool_new(2, &pool, &err), STATUS_OK);
     if (ground_render(&q, pool, NULL, &many, &err) != STATUS_OK) fail_msg("%s", err.text);
@@ -254,7 +254,7 @@ static void faults_are_refused(void **state)
     atomic_bool cancel = true;
     bend(&c, &bent);
     struct configuration view = view_from_above();
-    struct ground_request q = {bent, &view, -9, 100, 0.5, PX, PX, 16, 3, 0};
+    struct ground_request q = {bent, &view, -9, 100, 0.5, NULL, PX, PX, 16, 3, 0};
     const struct ground_filter how = {4, false};
     const struct progress cancelled = {.cancel = &cancel};
     assert_int_equal(ground_render(&q, NULL, &cancelled, &im, &err), STATUS_CANCELLED);
