@@ -43,9 +43,10 @@ def status(**changes):
              "fraction": 0.0, "eta_s": None, "heartbeat_unix_s": time.time(), "started_unix_s": STARTED, "message": "", "objective": None,
              "objective_se": None, "step": None, "warnings": [], "error": None, "peak_rss_bytes": 1 << 20}
     value.update(changes)
-    with open(path("status.json.new"), "w", encoding="utf-8") as f:
+    new = path(f"status.json.new-{os.getpid()}")  # a slow machine may still run the worker of the attempt before
+    with open(new, "w", encoding="utf-8") as f:
         json.dump(value, f)
-    os.replace(path("status.json.new"), path("status.json"))
+    os.replace(new, path("status.json"))
 
 
 def log(text):
