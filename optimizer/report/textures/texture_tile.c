@@ -14,14 +14,16 @@ enum { N_SMOOTHING = 8 };
 /* The most smoothing, which is a sixth of the width of a yarn of some forty fibers. */
 static const double most_smooth_radii = 4.0;
 /* Paths of each of the two renderings: so many on a square millimetre, since smoothing goes by the size of fibers and
- * not of tiles. A path takes as long as `as_photograph` of a path of a photograph. */
-static const double paths_per_mm2 = 2e6, least_paths = 2.5e5, most_paths = 4e6, as_photograph = 0.6;
+ * not of tiles. Forecasts, which do not know the tile, take `usual_paths`, of one of .75 mm2. A path takes as long as
+ * `as_photograph` of a path of a photograph. */
+static const double paths_per_mm2 = 2e6, least_paths = 2.5e5, most_paths = 4e6, usual_paths = 1.5e6,
+                    as_photograph = 0.6;
 static const double mm = 1e3, mm_of_cm = 10.0;
 
 double texture_tile_paths(const struct job_results *results, size_t n_row, double n_fit_path)
 {
     (void)results, (void)n_row, (void)n_fit_path;
-    return (2.0 * as_photograph * most_paths + texture_target_paths()) / TEXTURE_TILE_SHARE;
+    return (2.0 * as_photograph * usual_paths + texture_target_paths()) / TEXTURE_TILE_SHARE;
 }
 
 /* ---- size ---- */
