@@ -5,6 +5,7 @@
 #include "renderer/scattering/models/wave/solver/wave_mean.h"
 #include "tests/support/wave/mie_oblique.h"
 
+#include <float.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -76,7 +77,7 @@ static void circle(void **unused)
         double turn; /* without a mirror when not 0 */
     } body[] = {
         {0.5, 1.5, 0}, {5.213, 1.55, 0.3}, {10, 1.55 + 0.1 * I, 0}, {40, 1.549, 0.3}, {60, 1.55 + 0.001 * I, 0}};
-    static const double theta_deg[] = {0, 40, -60, 80, 87};
+    static const double theta_deg[] = {0, 40, -60, 80, 85, 87};
     for (size_t k = 0; k < sizeof body / sizeof *body; k++)
         for (size_t t = 0; t < sizeof theta_deg / sizeof *theta_deg; t++) {
             double worst[3] = {0};
@@ -84,7 +85,9 @@ static void circle(void **unused)
             print_message("x = %5.2f, m = %.3f + %.3f i, %3g degrees: amplitudes %.1e, extinction %.1e, "
                           "absorption %.1e\n",
                           body[k].x, creal(body[k].m), cimag(body[k].m), theta_deg[t], worst[0], worst[1], worst[2]);
-            for (int i = 0; i < 3; i++) assert_true(worst[i] < 1e-10);
+            /* rounding grows with 1 / cos^4, 9e-13 at 80 degrees and 1.1e-10 at 87, by the order of sums of the BLAS */
+            const double rounding = 10 * DBL_EPSILON / pow(cos(theta_deg[t] * RAD_PER_DEG), 4);
+            for (int i = 0; i < 3; i++) assert_true(worst[i] < fmax(1e-10, rounding));
         }
 }
 
