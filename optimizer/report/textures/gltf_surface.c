@@ -34,6 +34,49 @@ static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a
 
 static double largest(const double v[3]) { return fmax(fmax(v[0], v[1]), v[2]); }
 
+/* ---- energy ---- */
+
+/* Share of light that a GGX lobe without Fresnel sends back, from a view: a mean over half vectors by their density. */
+static double lobe_albedo(double alpha, double cos_o)
+{
+    enum { N_RING = 48 };
+    const double sin_o = sqrt(1.0 - cos_o * cos_o), a2 = alpha * alpha;
+    double sum = 0.0;
+    for (int i = 0; i < N_RING; i++)
+        for (int k = 0; k < N_PHI; k++) {
+            const double u = (i + 0.5) / N_RING, phi = M_PI * (k + 0.5) / N_PHI;
+            const double cos_h = sqrt((1.0 - u) / (1.0 + (a2 - 1.0) * u)), sin_h = sqrt(1.0 - cos_h * cos_h);
+            const double half = sin_o * sin_h * cos(phi) + cos_o * cos_h, cos_i = 2.0 * half * cos_h - cos_o;
+            if (!(cos_i > 0.0 && half > 0.0)) continue;
+            const double masked =
+                cos_i * sqrt(a2 + (1.0 - a2) * cos_o * cos_o) + cos_o * sqrt(a2 + (1.0 - a2) * cos_i * cos_i);
+            sum += 2.0 * cos_i * half / (masked * cos_h);
+        }
+    return fmin(sum / (N_RING * N_PHI), 1.0);
+}
+
+static void fill_lobe_albedo(struct gltf_surface *g)
+{
+    for (int r = 0; r < GLTF_N_COSINE; r++)
+        for (int i = 0; i < GLTF_N_COSINE; i++) {
+            const double step = 1.0 / (GLTF_N_COSINE - 1), roughness = fmax(r * step, least_roughness);
+            g->lobe_albedo[r][i] = lobe_albedo(roughness * roughness, fmax(i * step, 0.02));
+        }
+}
+
+static double lobe_albedo_at(const struct gltf_surface *g, double roughness, double cosine)
+{
+    const double at[2] = {roughness * (GLTF_N_COSINE - 1), fmin(cosine, 1.0) * (GLTF_N_COSINE - 1)};
+    int low[2];
+    double part[2];
+    for (int a = 0; a < 2; a++) {
+        low[a] = at[a] < GLTF_N_COSINE - 2 ? (int)at[a] : GLTF_N_COSINE - 2;
+        part[a] = at[a] - low[a];
+    }
+    const double *r0 = g->lobe_albedo[low[0]] + low[1], *r1 = g->lobe_albedo[low[0] + 1] + low[1];
+    return (1.0 - part[0]) * (r0[0] + part[1] * (r0[1] - r0[0])) + part[0] * (r1[0] + part[1] * (r1[1] - r1[0]));
+}
+
 static double rough(const struct gltf_surface *g, double root_spread)
 {
     return fmin(fmax(g->roughness * root_spread, least_roughness), 1.0);
@@ -136,9 +179,11 @@ void gltf_surface_reflect(const void *surface, const struct texture_sample *s, c
     const double lobe = cosine[0] > 0.0 ? microfacets(g, s, w, cosine) : 0.0;
     const double sheen = cosine[0] > 0.0 ? sheen_of(g->sheen_roughness, cosine[2], cosine[0], cosine[1]) : 0.0;
     const double below = 1.0 - largest(g->sheen) * fmax(albedo_at(g, cosine[0]), albedo_at(g, cosine[1]));
+    const double lost = 1.0 / lobe_albedo_at(g, rough(g, s->root_spread), cosine[1]) - 1.0;
     for (int c = 0; c < 3; c++) {
         const double fresnel = g->f0[c] + (g->f90 - g->f0[c]) * grazing, base = g->base[c] * s->share[c];
-        rgb[c] = below * (base * (1.0 - fresnel) + M_PI * fresnel * lobe) + M_PI * g->sheen[c] * sheen;
+        rgb[c] = below * (base * (1.0 - fresnel) + M_PI * fresnel * lobe * (1.0 + g->f0[c] * lost)) +
+                 M_PI * g->sheen[c] * sheen;
         rgb[c] = coat + uncoated * cosine[0] * rgb[c];
     }
 }
@@ -190,6 +235,7 @@ status gltf_surface_fit(struct gltf_surface *g, struct texture_maps *maps, const
     memcpy(least, lower, sizeof least);
     memcpy(most, upper, sizeof most);
     g->across_rad = most_across(maps);
+    fill_lobe_albedo(g);
     struct gltf_surface round = *g;
     status s = texture_fit_run(&model, g, maps, &g->means, target, &g->error, err);
     least[ANISOTROPY] = most[ANISOTROPY] = 0.0;

@@ -2,7 +2,8 @@
  * one direction, sheen over both, and a clear coat, whose normal is the mesh's. Khronos 2021, "glTF 2.0 Specification",
  * appendix B, with KHR_materials_specular, KHR_materials_anisotropy, KHR_materials_sheen and KHR_materials_clearcoat.
  * Where these leave a choice, viewers by three.js decide: masking of both directions together (Heitz 2014), sheen with
- * the visibility of Ashikhmin and Premoze (2007), and an anisotropy whose frame keeps the tangent of the mesh.
+ * the visibility of Ashikhmin and Premoze (2007), an anisotropy whose frame keeps the tangent of the mesh, and
+ * highlights that are brighter by what a rough surface sends back after several reflections (Fdez-Aguera 2019).
  *
  * The direction of the anisotropy is one for all pixels: viewers show the mean of a map from afar, and the mean of the
  * directions of weft and warp is neither. */
@@ -24,8 +25,9 @@ struct gltf_surface {
     double sheen[3], sheen_roughness;
     double coat, coat_roughness;
     double sheen_albedo[GLTF_N_COSINE]; /* of sheen of color 1, by the cosine of a direction in equal steps of [0, 1] */
-    double normal_scale;                /* factor on the slopes of the fibers, which the maps have after the fit */
-    struct texture_error error;         /* owned */
+    double lobe_albedo[GLTF_N_COSINE][GLTF_N_COSINE]; /* of a highlight without Fresnel, by roughness and cosine */
+    double normal_scale;        /* factor on the slopes of the fibers, which the maps have after the fit */
+    struct texture_error error; /* owned */
 };
 
 /* Fits the numbers; maps and means are given. Scales the normals of the maps as the fit says. STATUS_NO_MEMORY. */
