@@ -147,6 +147,15 @@ out:
     return s;
 }
 
+/* Shares sum to at most 1 but for the noise of the paths. */
+static bool are_shares(const struct header *h)
+{
+    bool sane = true;
+    for (int c = 0; c < 3; c++)
+        sane = sane && h->deep_back[c] >= 0 && h->deep_through[c] >= 0 && h->deep_back[c] + h->deep_through[c] < 2;
+    return sane;
+}
+
 static status check_header(const struct header *h, const char *name, struct error *err)
 {
     if (memcmp(h->magic, magic, sizeof magic) != 0)
@@ -162,7 +171,7 @@ static status check_header(const struct header *h, const char *name, struct erro
         h->n_segment > MOST_SEGMENT || h->n_row > h->n_segment || h->n_theta != FAST_N_THETA ||
         h->n_component != FAST_N_COMPONENT || h->n_gaussian != FAST_N_GAUSSIAN || h->n_grid != FAST_N_GRID ||
         h->deep_edge < 2 || h->deep_edge > DEEP_LIGHT_MOST_EDGE || h->deep_side == 0 || h->deep_side > 2 ||
-        h->mirrored > 1 || !(h->tile_mm[0] > 0.0) || !(h->tile_mm[1] > 0.0) || !(h->bottom_mm < 0.0))
+        h->mirrored > 1 || !(h->tile_mm[0] > 0.0) || !(h->tile_mm[1] > 0.0) || !(h->bottom_mm < 0.0) || !are_shares(h))
         return error_set(err, STATUS_FORMAT, "cannot read tables '%s': its header has counts that make no sense", name);
     return STATUS_OK;
 }

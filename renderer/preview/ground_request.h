@@ -14,8 +14,8 @@ struct ground_request {
     double z_mm;      /* of the plane, below the cloth; the orbit center is at 0 */
     double radius_mm; /* the plane is a disc around the z axis */
     double albedo;
-    const float
-        *through; /* rgb: share of light that each layer of the cloth lets through, for the studio; NULL: none */
+    /* rgb: share of light that each layer of the cloth lets through, for the studio; NULL: none */
+    const float *through;
     size_t width, height, n_sample; /* rays a pixel, at least 2 */
     uint64_t seed;
     uint32_t stream;

@@ -207,13 +207,14 @@ static void run_row(void *context, size_t y, size_t i_thread)
     const struct run *r = context;
     const struct ground_request *q = r->q;
     const struct rng_key key = {q->seed, ITERATION_OF_PIXELS, REPLICA, q->stream};
+    const size_t side = (size_t)lround(ceil(sqrt((double)q->n_sample)));
     for (size_t x = 0; x < q->width && !progress_cancelled(r->progress); x++) {
         const double middle[2] = {((double)x + 0.5) / (double)q->width, ((double)y + 0.5) / (double)q->height};
         struct rng rng;
         float *out = r->im->pixel + (y * q->width + x) * r->im->n_channel;
         rng_start(&rng, &key, (uint32_t)(y * q->width + x), 0);
         double seen = share_seen(r, x, y, COARSE_SIDE, &rng);
-        if (seen > 0 && seen < 1) seen = share_seen(r, x, y, q->n_sample, &rng);
+        if (seen > 0 && seen < 1) seen = share_seen(r, x, y, side, &rng);
         light_at(&r->light, middle, out);
         for (int c = 0; c < 3; c++) out[c] *= (float)seen;
     }

@@ -12,8 +12,8 @@
 #include "renderer/image/image.h"
 #include "renderer/preview/ground_request.h"
 
-/* q->radius_mm is not used, and q->n_sample squared are the rays of a pixel at the
- * border of the cloth that find how much of it is hidden. im: rgb and
+/* q->radius_mm is not used, and q->n_sample, made a square number, are the rays of a
+ * pixel at the border of the cloth that find how much of it is hidden. im: rgb and
  * zero variances, initialised here, released on failure. STATUS_INVALID (a flat scene, a camera below the ground),
  * STATUS_NO_MEMORY, STATUS_CANCELLED. The bits do not depend on the number of threads. */
 status studio_ground_render(const struct ground_request *q, struct thread_pool *pool, const struct progress *progress,

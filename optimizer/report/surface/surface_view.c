@@ -12,7 +12,7 @@
 #include <string.h>
 
 static const double mm = 1e-3, thick_mm = 0.8, camera_widths = 7.0; /* distance of the camera over the width */
-enum { GROUND_SIDE = 5 }; /* squared: rays of a pixel at the border of the cloth */
+enum { GROUND_RAYS = 25 };                                          /* of a pixel at the border of the cloth */
 
 bool surface_studio_is(const struct job_surface_picture *p) { return p->kind != JOB_KIND_MEASUREMENT; }
 
@@ -70,7 +70,7 @@ status surface_studio_ground(const struct report *report, const struct render_re
                                      .through = q->input.fast != NULL ? q->input.fast->tables->deep.through : NULL,
                                      .width = q->width,
                                      .height = q->height,
-                                     .n_sample = GROUND_SIDE,
+                                     .n_sample = GROUND_RAYS,
                                      .seed = q->seed,
                                      .stream = q->stream};
     return studio_ground_render(&g, report->in.job->tools->pool, progress, layer, err);

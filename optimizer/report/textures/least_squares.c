@@ -1,5 +1,7 @@
 #include "optimizer/report/textures/least_squares.h"
 
+#include "base/small_matrix.h"
+
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -58,28 +60,20 @@ static void find_normal_equations(struct work *w, const double *x)
     }
 }
 
-/* Solves (normal + damping diagonal) step = -gradient over the unknowns that are not held, by Cholesky. */
+/* Solves (normal + damping diagonal) step = -gradient over the unknowns that are not held. */
 static bool solve(const struct work *w, double damping, double step[MAX])
 {
     const size_t n = w->p->n_unknown;
-    double l[MAX][MAX], floor_of_diagonal = 0.0;
+    double m[MAX * MAX], floor_of_diagonal = 0.0;
     for (size_t a = 0; a < n; a++) floor_of_diagonal = fmax(floor_of_diagonal, 1e-9 * w->normal[a][a]);
     for (size_t a = 0; a < n; a++) {
-        for (size_t b = 0; b <= a; b++) {
-            double sum = w->held[a] || w->held[b] ? 0.0 : w->normal[a][b];
-            if (a == b) sum = w->held[a] ? 1.0 : sum + damping * fmax(sum, floor_of_diagonal) + floor_of_diagonal;
-            for (size_t k = 0; k < b; k++) sum -= l[a][k] * l[b][k];
-            if (a == b && !(sum > 0.0)) return false;
-            l[a][b] = a == b ? sqrt(sum) : sum / l[b][b];
-        }
+        for (size_t b = 0; b < a; b++) m[a * n + b] = w->held[a] || w->held[b] ? 0.0 : w->normal[a][b];
+        const double own = w->normal[a][a];
+        m[a * n + a] = w->held[a] ? 1.0 : own + damping * fmax(own, floor_of_diagonal) + floor_of_diagonal;
         step[a] = w->held[a] ? 0.0 : -w->gradient[a];
-        for (size_t k = 0; k < a; k++) step[a] -= l[a][k] * step[k];
-        step[a] /= l[a][a];
     }
-    for (size_t a = n; a-- > 0;) {
-        for (size_t k = a + 1; k < n; k++) step[a] -= l[k][a] * step[k];
-        step[a] /= l[a][a];
-    }
+    if (!small_factor(m, n, 0.0)) return false;
+    small_solve(m, n, step, 1);
     return true;
 }
 

@@ -80,32 +80,18 @@ static const char surface_inputs[] =
     "    <input name=\"geometry_normal\" type=\"vector3\" nodegraph=\"maps\" output=\"out_normal\"/>\n"
     "    <input name=\"geometry_tangent\" type=\"vector3\" nodegraph=\"maps\" output=\"out_tangent\"/>\n";
 
-static void print_number(FILE *text, const char *name, double value)
-{
-    fprintf(text, "    <input name=\"%s\" type=\"float\" value=\"%.6g\"/>\n", name, value);
-}
-
-static void print_color(FILE *text, const char *name, const double rgb[3], double factor)
-{
-    fprintf(text, "    <input name=\"%s\" type=\"color3\" value=\"%.6g, %.6g, %.6g\"/>\n", name, factor * rgb[0],
-            factor * rgb[1], factor * rgb[2]);
-}
-
 /* Inputs without a map. */
 static void print_numbers(FILE *text, const struct texture_surface *t)
 {
-    const struct texture_open_pbr in = texture_surface_inputs(t);
-    const double weight = in.fuzz_weight, unit = weight > 0.0 ? weight : 1.0;
-    print_number(text, "specular_weight", in.specular_weight);
-    print_number(text, "specular_ior", in.specular_ior);
-    print_color(text, "specular_color", t->specular_color, 1.0);
-    print_number(text, "coat_weight", t->coat_weight);
-    print_number(text, "coat_ior", in.coat_ior);
-    print_number(text, "coat_roughness", t->coat_roughness);
-    print_number(text, "coat_darkening", 0.0);
-    print_number(text, "fuzz_weight", weight);
-    print_color(text, "fuzz_color", t->fuzz, 1.0 / unit);
-    print_number(text, "fuzz_roughness", t->fuzz_roughness);
+    struct texture_input input[TEXTURE_N_INPUT];
+    texture_surface_list(t, input);
+    for (size_t i = 0; i < TEXTURE_N_INPUT; i++) {
+        const double *v = input[i].value;
+        fprintf(text, "    <input name=\"%s\" type=\"%s\" value=\"%.6g", input[i].name,
+                input[i].n == 1 ? "float" : "color3", v[0]);
+        if (input[i].n == 3) fprintf(text, ", %.6g, %.6g", v[1], v[2]);
+        fprintf(text, "\"/>\n");
+    }
 }
 
 status texture_materialx_write(const struct export_scene *e, const struct texture_surface *t, struct error *err)

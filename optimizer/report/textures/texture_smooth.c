@@ -1,5 +1,7 @@
 #include "optimizer/report/textures/texture_smooth.h"
 
+#include "base/small_matrix.h"
+
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -32,28 +34,16 @@ static void find_detail(struct smoothing *s)
     for (size_t i = 0; i < s->n * N_FEATURE; i++) s->detail[i] -= smooth[i];
 }
 
-/* Solves the normal equations by Cholesky; a part of the diagonal is added, so that features that do not vary are left
- * out. */
-static void solve(double a[N_FEATURE][N_FEATURE], double b[N_FEATURE][N_RGB])
+/* Solves the normal equations; a part of the diagonal is added, so that features that do not vary are left out. False:
+ * they have no solution. */
+static bool solve(double a[N_FEATURE][N_FEATURE], double b[N_FEATURE][N_RGB])
 {
     double most = 0.0;
     for (int k = 0; k < N_FEATURE; k++) most = fmax(most, a[k][k]);
     for (int k = 0; k < N_FEATURE; k++) a[k][k] += 1e-6 * most + 1e-30;
-    for (int j = 0; j < N_FEATURE; j++)
-        for (int i = 0; i <= j; i++) {
-            for (int k = 0; k < i; k++) a[j][i] -= a[j][k] * a[i][k];
-            a[j][i] = i == j ? sqrt(fmax(a[j][j], 1e-30)) : a[j][i] / a[i][i];
-        }
-    for (int c = 0; c < N_RGB; c++) {
-        for (int j = 0; j < N_FEATURE; j++) {
-            for (int k = 0; k < j; k++) b[j][c] -= a[j][k] * b[k][c];
-            b[j][c] /= a[j][j];
-        }
-        for (int j = N_FEATURE; j-- > 0;) {
-            for (int k = j + 1; k < N_FEATURE; k++) b[j][c] -= a[k][j] * b[k][c];
-            b[j][c] /= a[j][j];
-        }
-    }
+    if (!small_factor(&a[0][0], N_FEATURE, 0.0)) return false;
+    for (int c = 0; c < N_RGB; c++) small_solve(&a[0][0], N_FEATURE, &b[0][c], N_RGB);
+    return true;
 }
 
 /* rgb: light of one half, which becomes the smooth one. rest: what smoothing takes off. */
@@ -70,7 +60,7 @@ static void smooth_half(const struct smoothing *s, float *rgb, float *rest)
                 b[j][c] += (double)f[j] * (double)(rest[i * N_RGB + c] - rgb[i * N_RGB + c]);
         }
     }
-    solve(a, b);
+    if (!solve(a, b)) return; /* without what the features explain */
     for (size_t i = 0; i < s->n; i++)
         for (size_t c = 0; c < N_RGB; c++) {
             double value = (double)rgb[i * N_RGB + c];

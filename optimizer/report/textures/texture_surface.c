@@ -3,6 +3,7 @@
 #include "renderer/scattering/fresnel.h"
 
 #include <math.h>
+#include <string.h>
 
 /* OpenPBR's default coat: an index of 1.6, which reflects this share. */
 static const double coat_ior = 1.6, coat_straight = 0.0532544, least_roughness = 0.05;
@@ -238,4 +239,23 @@ struct texture_open_pbr texture_surface_inputs(const struct texture_surface *t)
         in.specular_weight = t->specular / (root * root);
     }
     return in;
+}
+
+void texture_surface_list(const struct texture_surface *t, struct texture_input input[TEXTURE_N_INPUT])
+{
+    const struct texture_open_pbr in = texture_surface_inputs(t);
+    const double *s = t->specular_color, unit = in.fuzz_weight > 0.0 ? in.fuzz_weight : 1.0;
+    const struct texture_input all[TEXTURE_N_INPUT] = {
+        {"specular_weight", 1, {in.specular_weight}},
+        {"specular_ior", 1, {in.specular_ior}},
+        {"specular_color", 3, {s[0], s[1], s[2]}},
+        {"coat_weight", 1, {t->coat_weight}},
+        {"coat_ior", 1, {in.coat_ior}},
+        {"coat_roughness", 1, {t->coat_roughness}},
+        {"coat_darkening", 1, {0.0}},
+        {"fuzz_weight", 1, {in.fuzz_weight}},
+        {"fuzz_color", 3, {t->fuzz[0] / unit, t->fuzz[1] / unit, t->fuzz[2] / unit}},
+        {"fuzz_roughness", 1, {t->fuzz_roughness}},
+    };
+    memcpy(input, all, sizeof all);
 }

@@ -50,6 +50,14 @@ struct texture_open_pbr {
     double specular_ior, specular_weight, coat_ior, fuzz_weight;
 };
 struct texture_open_pbr texture_surface_inputs(const struct texture_surface *t);
+/* Inputs of the OpenPBR surface that have no map, by their names in MaterialX. */
+struct texture_input {
+    const char *name;
+    size_t n; /* 1: a number, 3: a color */
+    double value[3];
+};
+enum { TEXTURE_N_INPUT = 10 };
+void texture_surface_list(const struct texture_surface *t, struct texture_input input[TEXTURE_N_INPUT]);
 
 /* GGX's density of the half vector h, for the widths ax and ay along tangent and bitangent, and Smith's Lambda of a
  * direction. */

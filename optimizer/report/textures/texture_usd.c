@@ -78,15 +78,10 @@ static void print_number(FILE *text, const char *name, double value)
     fprintf(text, "            float inputs:%s = %.6g\n", name, value);
 }
 
-static void print_color(FILE *text, const char *name, const double rgb[3], double factor)
-{
-    fprintf(text, "            color3f inputs:%s = (%.6g, %.6g, %.6g)\n", name, factor * rgb[0], factor * rgb[1],
-            factor * rgb[2]);
-}
-
 static void print_open_pbr(FILE *text, const struct texture_surface *t)
 {
-    const struct texture_open_pbr in = texture_surface_inputs(t);
+    struct texture_input input[TEXTURE_N_INPUT];
+    texture_surface_list(t, input);
     fprintf(text, "        def Shader \"open_pbr\"\n        {\n"
                   "            uniform token info:id = \"ND_open_pbr_surface_surfaceshader\"\n"
                   "            color3f inputs:base_color.connect = </Cloth/Surface/base_map.outputs:out>\n"
@@ -95,16 +90,13 @@ static void print_open_pbr(FILE *text, const struct texture_surface *t)
                   "</Cloth/Surface/anisotropy_map.outputs:out>\n"
                   "            float3 inputs:geometry_normal.connect = </Cloth/Surface/shading_normal.outputs:out>\n"
                   "            float3 inputs:geometry_tangent.connect = </Cloth/Surface/across_fibers.outputs:out>\n");
-    print_number(text, "specular_weight", in.specular_weight);
-    print_number(text, "specular_ior", in.specular_ior);
-    print_color(text, "specular_color", t->specular_color, 1.0);
-    print_number(text, "coat_weight", t->coat_weight);
-    print_number(text, "coat_ior", in.coat_ior);
-    print_number(text, "coat_roughness", t->coat_roughness);
-    print_number(text, "coat_darkening", 0.0);
-    print_number(text, "fuzz_weight", in.fuzz_weight);
-    print_color(text, "fuzz_color", t->fuzz, in.fuzz_weight > 0.0 ? 1.0 / in.fuzz_weight : 1.0);
-    print_number(text, "fuzz_roughness", t->fuzz_roughness);
+    for (size_t i = 0; i < TEXTURE_N_INPUT; i++) {
+        const double *v = input[i].value;
+        if (input[i].n == 1)
+            print_number(text, input[i].name, v[0]);
+        else
+            fprintf(text, "            color3f inputs:%s = (%.6g, %.6g, %.6g)\n", input[i].name, v[0], v[1], v[2]);
+    }
     fprintf(text, "            token outputs:out\n        }\n");
 }
 

@@ -12,14 +12,14 @@
 #include "base/angle.h"
 #include "renderer/scattering/models/wave/solver/oblique_solver.h"
 #include "renderer/scattering/scattering.h"
-#include "tests/support/wave/mie_oblique.h"
+#include "tests/support/wave/circle_amplitudes.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
 
-enum { N_ANGLE = 360, N_PAIR = WAVE_N_FIELD * WAVE_N_FIELD, N_PREPARE = 20 };
+enum { N_PREPARE = 20 };
 
 static void stop(const char *what)
 {
@@ -34,26 +34,15 @@ static double oblique_error(double x, double complex m, double theta_rad, double
     struct wave_outline circle;
     struct oblique_solver *s = NULL;
     struct error err = {0};
-    double off = 0, top = 0;
     wave_outline_ellipse(&circle, 1, 1);
     circle.forward[1] *= cexp(I * turn);
     const struct oblique_problem p = {&circle, x, m, theta_rad, wave_solver_nodes(&circle, x, creal(m), 4)};
     if (oblique_solver_new(&p, &s, &err) != STATUS_OK || oblique_solver_solve(s, &angle, 1, &err) != STATUS_OK)
         stop(err.text);
     if (mie_oblique_init(&mie, x, m, theta_rad) != 0) stop("the circle is too large");
-    for (int j = 0; j < N_ANGLE; j++) {
-        double complex t[N_PAIR];
-        oblique_solver_towards(s, 2 * M_PI * j / N_ANGLE, t);
-        for (int pair = 0; pair < N_PAIR; pair++) {
-            const double complex want =
-                mie_oblique_amplitude(&mie, (enum mie_field)(pair / WAVE_N_FIELD),
-                                      (enum mie_field)(pair % WAVE_N_FIELD), 2 * M_PI * j / N_ANGLE - angle);
-            off = fmax(off, cabs(t[pair] - want));
-            top = fmax(top, cabs(want));
-        }
-    }
+    const double error = circle_amplitude_error(s, &mie, angle);
     oblique_solver_free(s);
-    return off / top;
+    return error;
 }
 
 static double prepare_ms(void)

@@ -3,7 +3,7 @@
  */
 #include "base/angle.h"
 #include "renderer/scattering/models/wave/solver/wave_mean.h"
-#include "tests/support/wave/mie_oblique.h"
+#include "tests/support/wave/circle_amplitudes.h"
 
 #include <float.h>
 #include <math.h>
@@ -36,7 +36,6 @@ static void published_cross_sections(void **unused)
 /* Largest errors of amplitudes over the largest one, of extinction, and of absorption over extinction. */
 static void circle_errors(double x, double complex m, double theta_rad, double turn, double worst[3])
 {
-    enum { N_ANGLE = 360 };
     static struct mie_oblique mie;
     const double angle = 0.7;
     struct wave_outline circle;
@@ -46,19 +45,7 @@ static void circle_errors(double x, double complex m, double theta_rad, double t
     struct oblique_solver *s = solved(&p, &angle, 1);
     assert_true(oblique_solver_is_symmetric(s) == (turn == 0));
     assert_int_equal(mie_oblique_init(&mie, x, m, theta_rad), 0);
-    double off = 0, top = 0;
-    for (int j = 0; j < N_ANGLE; j++) {
-        double complex t[N_PAIR];
-        oblique_solver_towards(s, 2 * M_PI * j / N_ANGLE, t);
-        for (int pair = 0; pair < N_PAIR; pair++) {
-            const double complex want =
-                mie_oblique_amplitude(&mie, (enum mie_field)(pair / WAVE_N_FIELD),
-                                      (enum mie_field)(pair % WAVE_N_FIELD), 2 * M_PI * j / N_ANGLE - angle);
-            off = fmax(off, cabs(t[pair] - want));
-            top = fmax(top, cabs(want));
-        }
-    }
-    worst[0] = fmax(worst[0], off / top);
+    worst[0] = fmax(worst[0], circle_amplitude_error(s, &mie, angle));
     for (int field = 0; field < WAVE_N_FIELD; field++) { /* widths of a diameter of 4 */
         const double ext = 4 * mie_oblique_extinction(&mie, (enum mie_field)field),
                      sca = 4 * mie_oblique_scattering(&mie, (enum mie_field)field);
