@@ -64,6 +64,8 @@
 #define OPTION_MEASUREMENT_FILE "measurement_file"
 #define OPTION_MEASURED_ROWS "measured_rows"
 #define OPTION_PROFILE_FILE "profile_file"
+#define OPTION_PROFILE_TURN "profile_turn"
+#define OPTION_PROFILE_MODE "profile_mode"
 #define OPTION_BOWL_PHOTOGRAPH "bowl_photograph"
 #define OPTION_BOWL_MARKS "bowl_marks"
 #define OPTION_BOWL_MARK "bowl_mark"

@@ -8,24 +8,26 @@
 
 enum { MOST_CHART = 8, LEAST_ROW = 4 };
 
-/* Rows in the order of theta_i, theta_o and phi. */
+/* Rows in the order of theta_i, theta_o, phi_i and phi. */
 static int compare_rows(const void *a, const void *b)
 {
     const struct profile_row *x = *(const struct profile_row *const *)a, *y = *(const struct profile_row *const *)b;
-    const double by[3] = {x->theta_i_rad - y->theta_i_rad, x->theta_o_rad - y->theta_o_rad, x->phi_rad - y->phi_rad};
-    for (int k = 0; k < 3; k++)
+    const double by[4] = {x->theta_i_rad - y->theta_i_rad, x->theta_o_rad - y->theta_o_rad, x->phi_i_rad - y->phi_i_rad,
+                          x->phi_rad - y->phi_rad};
+    for (int k = 0; k < 4; k++)
         if (by[k] < 0.0 || by[k] > 0.0) return by[k] < 0.0 ? -1 : 1;
     return 0;
 }
 
-/* Rows of one theta_i and theta_o: from row `first` of the sorted ones to before `end`. */
+/* Rows of one theta_i, theta_o and phi_i: from row `first` of the sorted ones to before `end`. */
 struct slice {
     size_t first, end;
 };
 
 static bool same_slice(const struct profile_row *a, const struct profile_row *b)
 {
-    return fabs(a->theta_i_rad - b->theta_i_rad) < 1e-6 && fabs(a->theta_o_rad - b->theta_o_rad) < 1e-6;
+    return fabs(a->theta_i_rad - b->theta_i_rad) < 1e-6 && fabs(a->theta_o_rad - b->theta_o_rad) < 1e-6 &&
+           fabs(a->phi_i_rad - b->phi_i_rad) < 1e-6;
 }
 
 static size_t find_slices(const struct profile_row *const *row, size_t n, struct slice *slice)
@@ -44,7 +46,7 @@ static void chart(const struct report *report, size_t i_model, const struct prof
 {
     const size_t n = s->end - s->first, n_channel = report->in.fiber->profile.n_channel;
     struct page_point *point = calloc(n * n_channel, sizeof *point);
-    char title[80];
+    char title[120];
     if (point == NULL) return;
     for (size_t k = 0; k < n * n_channel; k++) {
         const struct profile_row *r = row[s->first + k % n];
@@ -54,8 +56,12 @@ static void chart(const struct report *report, size_t i_model, const struct prof
                                        .se = r->se[channel],
                                        .fitted = report->model[i_model].fit->profile.value[at]};
     }
-    snprintf(title, sizeof title, "phi, degrees, at theta_i %.4g, theta_o %.4g degrees",
-             angle_to_deg(row[s->first]->theta_i_rad), angle_to_deg(row[s->first]->theta_o_rad));
+    int used = snprintf(title, sizeof title, "phi, degrees, at theta_i %.4g, theta_o %.4g",
+                        angle_to_deg(row[s->first]->theta_i_rad), angle_to_deg(row[s->first]->theta_o_rad));
+    if (report->in.fiber->profile.has_phi_i)
+        used +=
+            snprintf(title + used, sizeof title - (size_t)used, ", phi_i %.4g", angle_to_deg(row[s->first]->phi_i_rad));
+    snprintf(title + used, sizeof title - (size_t)used, " degrees");
     page_measured_and_fitted(title, point, n, n_channel, out);
     free(point);
 }
@@ -90,6 +96,9 @@ void profile_page(const struct report *report, size_t i, FILE *out)
     if (isfinite(f->chi_square))
         fprintf(out, "<tr><td>squared residuals over stated variances</td><td>%.3g</td></tr>\n", f->chi_square);
     fprintf(out, "<tr><td>scale</td><td>%.5g%s</td></tr>\n", f->scale, f->scale_se > 0.0 ? "" : ", as stated");
+    if (f->has_turn)
+        fprintf(out, "<tr><td>turn of the section</td><td>%.4g%s degrees</td></tr>\n", angle_to_deg(f->turn_rad),
+                f->turn_determined ? "" : " (not determined)");
     fprintf(out, "<tr><td>starts that came to this result</td><td>%zu of %zu</td></tr>\n</table>\n", f->n_agree,
             f->n_start);
     profile_charts(report, i, MOST_CHART, out);

@@ -91,6 +91,11 @@ struct scattering_model {
      * the derivatives of its logarithm by each parameter, NULL when not wanted. NULL: 1, the section is round or turned
      * at random. */
     float (*width)(const struct scattering_state *state, const float w[3], float *score);
+    /* The modes whose light a state can have alone, such as "R" and "TRT", NULL-terminated; NULL: none. keep_mode takes
+     * all other modes out of a state that no thread uses yet: eval is then the light of mode[k], as it is measured
+     * where modes are apart along the fiber, while sample and pdf stay as they were. */
+    const char *const *mode;
+    void (*keep_mode)(struct scattering_state *state, size_t k);
     /* The standard deviation in th_i of the narrowest lobe about th_i = -th_o, by which lamps are sampled. NULL: the
      * model has none. */
     float (*lobe_rad)(const struct scattering_state *state);

@@ -54,7 +54,8 @@ static double sandwich(const double *inverse, const double *spread, const size_t
 /* The variance of an unknown that the allowed range alone gives, as a weak prior: uniform over it. */
 static double range_variance(const struct profile_target *t, size_t u)
 {
-    if (u + 1 == t->n_unknown) return 1e2; /* ln of the scale */
+    if (u == t->i_scale) return 1e2;               /* ln of the scale */
+    if (u == t->i_turn) return M_PI * M_PI / 12.0; /* half a turn: then the section is the same */
     const double range = t->coordinate[u].upper - t->coordinate[u].lower;
     return range * range / 12.0;
 }
@@ -87,6 +88,9 @@ static void deviations(const struct profile_search *s, double *sd)
                              : sqrt(range_variance(t, index[a]));
 }
 
+/* Half of the standard deviation of a turn of which nothing is known. */
+static const double determined_turn_rad = 0.5 * M_PI / 3.4641016151377544;
+
 static bool near_bound(const struct coordinate *k, double x)
 {
     const double margin = 1e-3 * (k->upper - k->lower);
@@ -112,6 +116,10 @@ void profile_error_put(const struct profile_search *s, struct profile_fit *fit)
         fit->at_bound[p] = !t->fixed[u] && near_bound(&t->coordinate[u], s->here.x[u]);
         fit->determined[p] = t->fixed[u] || uncertainty_determined(&t->coordinate[u], sd[u], se[u]);
     }
-    fit->scale = exp(s->here.x[t->n_unknown - 1]);
-    fit->scale_se = fit->scale * sd[t->n_unknown - 1];
+    fit->scale = exp(s->here.x[t->i_scale]);
+    fit->scale_se = fit->scale * sd[t->i_scale];
+    fit->has_turn = profile_model_turns(t->problem->model, t->problem->profile);
+    fit->turn_rad = s->here.x[t->i_turn] - M_PI * floor(s->here.x[t->i_turn] / M_PI);
+    fit->turn_se_rad = sd[t->i_turn];
+    fit->turn_determined = t->fixed[t->i_turn] || sd[t->i_turn] < determined_turn_rad;
 }

@@ -59,6 +59,19 @@ static void tie_channels(const struct profile_problem *problem, struct fit_optio
     }
 }
 
+/* Sets the mode that the profile shows. */
+static status find_mode(struct profile_target *t, struct error *err)
+{
+    const struct profile_problem *p = t->problem;
+    if (p->mode == NULL) return STATUS_OK;
+    for (const char *const *m = p->model->mode; m != NULL && *m != NULL; m++)
+        if (strcmp(*m, p->mode) == 0) t->mode = (size_t)(m - p->model->mode) + 1;
+    if (t->mode > 0) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, OPTION_PROFILE_MODE,
+                           "the profile shows the mode %s alone, which '%s' cannot do: it has all modes together",
+                           p->mode, p->model->id);
+}
+
 static status target_init(struct profile_target *t, const struct profile_problem *problem, const char *table_name,
                           size_t *n_free, struct error *err)
 {
@@ -67,8 +80,11 @@ static status target_init(struct profile_target *t, const struct profile_problem
     o.global_gain_sd = o.stray_light_sd = 0.0;
     tie_channels(problem, &o);
     status s = fit_layout_init(&t->layout, problem->model->param, problem->parameter, problem->model->n_param, &o, err);
+    if (s == STATUS_OK) s = find_mode(t, err);
     if (s != STATUS_OK) return s;
-    t->n_unknown = t->layout.n_unknown + 1;
+    t->i_turn = t->layout.n_unknown;
+    t->i_scale = t->layout.n_unknown + 1;
+    t->n_unknown = t->layout.n_unknown + 2;
     *n_free = 0;
     for (size_t u = 0; u < t->layout.n_unknown; u++) {
         const struct fit_parameter *k = &t->layout.parameter[u];
@@ -76,8 +92,9 @@ static status target_init(struct profile_target *t, const struct profile_problem
         t->fixed[u] = k->fixed;
         *n_free += !k->fixed;
     }
-    t->fixed[t->n_unknown - 1] = !isnan(problem->scale);
-    *n_free += isnan(problem->scale) ? 1 : 0;
+    t->fixed[t->i_turn] = !isnan(problem->turn_rad) || !profile_model_turns(problem->model, problem->profile);
+    t->fixed[t->i_scale] = !isnan(problem->scale);
+    *n_free += (size_t)!t->fixed[t->i_turn] + (size_t)!t->fixed[t->i_scale];
     if (t->n_value <= *n_free)
         return error_set_field(err, STATUS_INVALID, OPTION_PROFILE_FILE,
                                "cannot use table '%s': it ends at line %zu with %zu radiances, but the fit of '%s' has "
@@ -135,7 +152,8 @@ static void run_start(void *context, size_t k, size_t i_thread)
     (void)i_thread;
     for (size_t u = 0; u < l->n_unknown; u++) unknown[u] = l->parameter[u].start;
     if (k > 0) fit_run_start(l, k, unknown);
-    all->code[k] = profile_search_begin(&all->search[k], all->target, NULL, unknown, first_misfit, &all->error[k]);
+    const struct profile_start from = {unknown, first_misfit, k % 3 == 2};
+    all->code[k] = profile_search_begin(&all->search[k], all->target, NULL, &from, &all->error[k]);
     all->start[k].all = all;
     all->search[k].progress = (struct progress){.report = report_start, .context = &all->start[k]};
     if (all->code[k] == STATUS_OK)

@@ -3,6 +3,9 @@
  *
  *   minimised: sum over values m of ((s L - m) / e)^2 + priors,   e^2 = se^2 + (t (m + 0.02 mean of m))^2
  *
+ * Where the profile has azimuths of the light and the model distinguishes them, the turn of the section is an unknown
+ * too, of which every start scans half a turn first (profile_search.h).
+ *
  * s is the scale, L the model's radiance (profile_model.h), se the stated error and t the relative misfit: the
  * residuals beyond the stated errors, chosen so that the sum is the number of values less the number of unknowns, and 0
  * where the stated errors explain the residuals. Without stated errors all of e is misfit, and the fit is one of
@@ -25,7 +28,8 @@ size_t profile_fit_starts(const struct fit_option *option);
 /* Memory that a fit of n_start starts takes besides the profile and the states of its model. */
 size_t profile_fit_bytes(const struct fiber_profile *profile, size_t n_param, size_t n_start);
 
-/* STATUS_INVALID with the field OPTION_PROFILE_FILE for fewer values than unknowns; STATUS_CANCELLED; errors of
+/* STATUS_INVALID with the field OPTION_PROFILE_FILE for fewer values than unknowns, OPTION_PROFILE_MODE for a mode that
+ * the model does not have alone; STATUS_CANCELLED; errors of
  * fit_layout_init and of the model. */
 status profile_fit_run(const struct profile_problem *problem, const char *table_name, struct profile_fit *fit,
                        struct error *err);

@@ -12,6 +12,8 @@ enum { N = PROFILE_MAX_UNKNOWN };
  * the errors of the unknowns change it by 1. */
 static const double least_decrease = 1e-5;
 static const double scale_step = 2.0, scale_range = 30.0; /* of ln of the scale */
+static const double turn_step = 0.35;                     /* rad */
+enum { N_TURN = 60 };                                     /* of a scan, 3 degrees apart */
 
 static const struct scattering_model *model_of(const struct profile_search *s) { return s->target->problem->model; }
 
@@ -32,7 +34,7 @@ static double sum_of(const struct profile_search *s, const struct profile_point 
         const double r = (p->value[i] - s->target->measured[i]) / s->error[i];
         f += r * r;
     }
-    for (size_t u = 0; u + 1 < s->target->n_unknown; u++) {
+    for (size_t u = 0; u < s->target->layout.n_unknown; u++) {
         const double d = p->x[u] - s->target->layout.prior[u].mean;
         f += s->target->layout.prior[u].precision * d * d;
     }
@@ -41,7 +43,7 @@ static double sum_of(const struct profile_search *s, const struct profile_point 
 
 static void unknowns_of(const struct profile_target *t, const double *x, double *unknown)
 {
-    for (size_t u = 0; u + 1 < t->n_unknown; u++)
+    for (size_t u = 0; u < t->layout.n_unknown; u++)
         unknown[u] = t->fixed[u] ? t->layout.parameter[u].start : coordinate_to_param(&t->coordinate[u], x[u]);
 }
 
@@ -50,7 +52,7 @@ static void chain(const struct profile_search *s, struct profile_point *p, const
 {
     const struct profile_target *t = s->target;
     const size_t n = t->n_unknown, n_param = model_of(s)->n_param;
-    const double scale = exp(p->x[n - 1]);
+    const double scale = exp(p->x[t->i_scale]);
     double slope[FIT_MAX_PARAM];
     for (size_t q = 0; q < n_param; q++) {
         const size_t u = t->layout.owner[q];
@@ -62,7 +64,8 @@ static void chain(const struct profile_search *s, struct profile_point *p, const
         for (size_t q = 0; q < n_param; q++)
             if (!t->fixed[t->layout.owner[q]]) row[t->layout.owner[q]] += slope[q] * s->by_param[i * n_param + q];
         p->value[i] *= scale;
-        row[n - 1] = t->fixed[n - 1] ? 0.0 : p->value[i];
+        if (!t->fixed[t->i_turn]) row[t->i_turn] = scale * s->by_turn[i];
+        if (!t->fixed[t->i_scale]) row[t->i_scale] = p->value[i];
     }
 }
 
@@ -72,7 +75,11 @@ static status evaluate(struct profile_search *s, struct profile_point *p, struct
     unknowns_of(s->target, p->x, unknown);
     fit_layout_full(&s->target->layout, unknown, full);
     s->n_evaluation++;
-    const struct profile_work work = {s->pool, s->target->problem->progress};
+    const struct profile_work work = {.pool = s->pool,
+                                      .progress = s->target->problem->progress,
+                                      .turn_rad = p->x[s->target->i_turn],
+                                      .mode = s->target->mode,
+                                      .by_turn = s->by_turn};
     status code =
         profile_model_predict(model_of(s), full, s->target->problem->profile, &work, p->value, s->by_param, err);
     if (code != STATUS_OK) return code;
@@ -93,6 +100,56 @@ static double best_scale(const struct profile_search *s, const double *value)
     return ll > 0.0 && lm > 0.0 ? lm / ll : 1.0;
 }
 
+/* ---- the turn where a search begins ---- */
+
+/* The sum of squares at each turn of a scan, with the best scale there. */
+struct turn_scan {
+    const struct profile_search *search;
+    double f[N_TURN];
+};
+
+static void note_turn(void *context, size_t k, const double *value)
+{
+    struct turn_scan *scan = context;
+    const struct profile_search *s = scan->search;
+    const double scale =
+        s->target->fixed[s->target->i_scale] ? exp(s->here.x[s->target->i_scale]) : best_scale(s, value);
+    scan->f[k] = 0.0;
+    for (size_t i = 0; i < s->target->n_value; i++) {
+        const double r = (scale * value[i] - s->target->measured[i]) / s->error[i];
+        scan->f[k] += r * r;
+    }
+}
+
+/* The turn of the least sum; with `second` the least one of the other minima, if there is another. */
+static double best_turn(const double f[N_TURN], bool second)
+{
+    size_t best = N_TURN, next = N_TURN;
+    for (size_t k = 0; k < N_TURN; k++) {
+        if (f[k] > f[(k + 1) % N_TURN] || f[k] > f[(k + N_TURN - 1) % N_TURN]) continue;
+        if (best == N_TURN || f[k] < f[best]) {
+            next = best;
+            best = k;
+        } else if (next == N_TURN || f[k] < f[next])
+            next = k;
+    }
+    return M_PI * (double)(second && next != N_TURN ? next : best) / N_TURN;
+}
+
+static status begin_turn(struct profile_search *s, bool second, struct error *err)
+{
+    double unknown[FIT_MAX_PARAM], full[FIT_MAX_PARAM];
+    struct turn_scan found = {.search = s};
+    unknowns_of(s->target, s->here.x, unknown);
+    fit_layout_full(&s->target->layout, unknown, full);
+    const struct profile_work work = {
+        .pool = s->pool, .progress = s->target->problem->progress, .mode = s->target->mode};
+    const struct profile_scan scan = {N_TURN, s->here.value, note_turn, &found};
+    status code = profile_model_scan(model_of(s), full, s->target->problem->profile, &work, &scan, err);
+    if (code == STATUS_OK) s->here.x[s->target->i_turn] = best_turn(found.f, second);
+    return code;
+}
+
 static status new_point(struct profile_point *p, const struct profile_target *t, struct error *err)
 {
     p->value = calloc(t->n_value, sizeof *p->value);
@@ -102,24 +159,28 @@ static status new_point(struct profile_point *p, const struct profile_target *t,
 }
 
 status profile_search_begin(struct profile_search *s, const struct profile_target *target, struct thread_pool *pool,
-                            const double *unknown, double misfit, struct error *err)
+                            const struct profile_start *start, struct error *err)
 {
     const size_t n = target->n_unknown;
     *s = (struct profile_search){.target = target, .pool = pool};
     s->error = calloc(target->n_value, sizeof *s->error);
     s->by_param = calloc(target->n_value * target->problem->model->n_param, sizeof *s->by_param);
-    if (s->error == NULL || s->by_param == NULL)
+    if (!target->fixed[target->i_turn]) s->by_turn = calloc(target->n_value, sizeof *s->by_turn);
+    if (s->error == NULL || s->by_param == NULL || (!target->fixed[target->i_turn] && s->by_turn == NULL))
         return error_set(err, STATUS_NO_MEMORY, "cannot fit a profile: out of memory");
     status code = new_point(&s->here, target, err);
     if (code == STATUS_OK) code = new_point(&s->next, target, err);
     if (code != STATUS_OK) return code;
-    profile_search_set_misfit(s, misfit);
-    for (size_t u = 0; u + 1 < n; u++) s->here.x[u] = coordinate_from_param(&target->coordinate[u], unknown[u]);
-    s->here.x[n - 1] = target->fixed[n - 1] ? log(target->problem->scale) : 0.0;
-    code = evaluate(s, &s->here, err);
-    if (code != STATUS_OK || target->fixed[n - 1]) return code;
+    profile_search_set_misfit(s, start->misfit);
+    for (size_t u = 0; u < target->layout.n_unknown; u++)
+        s->here.x[u] = coordinate_from_param(&target->coordinate[u], start->unknown[u]);
+    s->here.x[target->i_turn] = isnan(target->problem->turn_rad) ? 0.0 : target->problem->turn_rad;
+    s->here.x[target->i_scale] = target->fixed[target->i_scale] ? log(target->problem->scale) : 0.0;
+    if (!target->fixed[target->i_turn]) code = begin_turn(s, start->second, err);
+    if (code == STATUS_OK) code = evaluate(s, &s->here, err);
+    if (code != STATUS_OK || target->fixed[target->i_scale]) return code;
     const double scale = best_scale(s, s->here.value);
-    s->here.x[n - 1] = log(scale);
+    s->here.x[target->i_scale] = log(scale);
     for (size_t i = 0; i < target->n_value * n; i++) s->here.jac[i] *= scale;
     for (size_t i = 0; i < target->n_value; i++) s->here.value[i] *= scale;
     s->here.f = sum_of(s, &s->here);
@@ -128,7 +189,7 @@ status profile_search_begin(struct profile_search *s, const struct profile_targe
 
 size_t profile_search_bytes(const struct fiber_profile *profile, size_t n_param)
 {
-    const size_t n_jac = n_param + 1, of_value = 1 + n_param + 2 * (1 + n_jac); /* see profile_search_begin */
+    const size_t n_jac = n_param + 2, of_value = 2 + n_param + 2 * (1 + n_jac); /* see profile_search_begin */
     return sizeof(double) * profile->n * profile->n_channel * of_value;
 }
 
@@ -136,6 +197,7 @@ void profile_search_end(struct profile_search *s)
 {
     free(s->error);
     free(s->by_param);
+    free(s->by_turn);
     free(s->here.value);
     free(s->here.jac);
     free(s->next.value);
@@ -159,7 +221,7 @@ void profile_search_normal(const struct profile_search *s, double *hessian, doub
     }
     for (size_t u = 0; u < n; u++) {
         for (size_t v = 0; v < u; v++) hessian[v * n + u] = hessian[u * n + v];
-        if (u + 1 == n) continue;
+        if (u >= t->layout.n_unknown) continue;
         hessian[u * n + u] += t->layout.prior[u].precision;
         gradient[u] += t->layout.prior[u].precision * (s->here.x[u] - t->layout.prior[u].mean);
     }
@@ -177,10 +239,12 @@ static status step(struct profile_search *s, double damping, double *expected, s
         if (!t->fixed[u]) index[m++] = u;
     for (size_t a = 0; a < m; a++) {
         const size_t u = index[a];
-        const bool is_scale = u + 1 == n;
-        const double limit = is_scale ? scale_step : 2.0 * t->coordinate[u].step_limit, x = s->here.x[u];
-        lower[a] = fmax(-limit, (is_scale ? x - scale_range : t->coordinate[u].lower) - x);
-        upper[a] = fmin(limit, (is_scale ? x + scale_range : t->coordinate[u].upper) - x);
+        const bool of_model = u < t->layout.n_unknown;
+        const double x = s->here.x[u], limit = of_model         ? 2.0 * t->coordinate[u].step_limit
+                                               : u == t->i_turn ? turn_step
+                                                                : scale_step;
+        lower[a] = fmax(-limit, (of_model ? t->coordinate[u].lower : x - scale_range) - x);
+        upper[a] = fmin(limit, (of_model ? t->coordinate[u].upper : x + scale_range) - x);
         g[a] = slope[u];
         for (size_t b = 0; b < m; b++) h[a * m + b] = full[u * n + index[b]];
         h[a * m + a] += damping * h[a * m + a] + 1e-6 * s->here.f / (limit * limit);

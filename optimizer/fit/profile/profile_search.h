@@ -4,21 +4,23 @@
 
 #include "optimizer/fit/profile/profile_problem.h"
 
-enum { PROFILE_MAX_UNKNOWN = FIT_MAX_PARAM + 1 };
+enum { PROFILE_MAX_UNKNOWN = FIT_MAX_PARAM + 2 };
 
-/* Shared by all searches of a fit. The unknowns of the layout come first, then ln of the scale. */
+/* Shared by all searches of a fit. The unknowns of the layout come first, then the turn of the section and ln of the
+ * scale. */
 struct profile_target {
     const struct profile_problem *problem;
     struct fit_layout layout;
     struct coordinate coordinate[FIT_MAX_PARAM];
-    size_t n_unknown, n_value;
+    size_t i_turn, i_scale, n_unknown, n_value;
+    size_t mode; /* of profile_work */
     bool fixed[PROFILE_MAX_UNKNOWN];
     double *measured, *base; /* m, and max(m, 0) + 0.02 mean of m; one of each value */
 };
 
 /* A place of a search. */
 struct profile_point {
-    double x[PROFILE_MAX_UNKNOWN]; /* fit coordinates; the last one is ln of the scale */
+    double x[PROFILE_MAX_UNKNOWN]; /* fit coordinates; the turn in radians; ln of the scale */
     double f;                      /* the minimised sum, priors included */
     double *value, *jac;           /* s L; its derivatives by x, jac[i * n_unknown + u] */
 };
@@ -30,13 +32,22 @@ struct profile_search {
     struct profile_point here, next;
     double *error;    /* e of each value */
     double *by_param; /* derivatives by the model's parameters */
+    double *by_turn;  /* and by the turn; NULL where it is not fitted */
     size_t n_evaluation;
     bool converged;
 };
 
-/* Takes memory; the search starts at the parameters `unknown` of the layout with the best scale there. */
+/* Where a search begins. A turn that is fitted begins at the best one of a scan over all turns, or, with `second`, at
+ * the best one beyond the next maximum of the sum: a section that is turned by 90 degrees can be a minimum too. */
+struct profile_start {
+    const double *unknown; /* parameters of the layout */
+    double misfit;
+    bool second;
+};
+
+/* Takes memory; the search begins with the best scale. */
 status profile_search_begin(struct profile_search *s, const struct profile_target *target, struct thread_pool *pool,
-                            const double *unknown, double misfit, struct error *err);
+                            const struct profile_start *start, struct error *err);
 void profile_search_end(struct profile_search *s);
 /* Memory of one search. */
 size_t profile_search_bytes(const struct fiber_profile *profile, size_t n_param);

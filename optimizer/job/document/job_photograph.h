@@ -36,7 +36,7 @@ struct job_photograph {
 struct job_bowl_photograph {
     struct job_photograph picture;       /* members that belong to a view of the cloth are unused */
     char background[JOB_MAX_NAME_BYTES]; /* "": none */
-    double theta_i_deg, phi_i_deg;
+    double theta_i_deg, phi_i_deg, fiber_turn_deg;
 };
 
 #endif

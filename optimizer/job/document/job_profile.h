@@ -30,6 +30,8 @@ struct job_bowl {
 struct job_profile {
     char file[JOB_MAX_NAME_BYTES]; /* "" for a job with a cloth or a bowl */
     double theta_i_deg, scale;     /* NaN: a column of the profile; fitted */
+    double turn_deg;               /* of the section; NaN: fitted */
+    char mode[8];                  /* "all", or the one that the profile shows */
     struct job_bowl bowl;          /* in place of file */
 };
 
@@ -37,5 +39,7 @@ struct job_profile {
 bool job_profile_given(const struct job_profile *profile);
 /* The file that messages name the profile by: its table, or the first photograph of the bowl. */
 const char *job_profile_name(const struct job_profile *profile);
+/* The mode that the profile shows alone; NULL: all of them. */
+const char *job_profile_mode(const struct job_profile *profile);
 
 #endif

@@ -18,6 +18,11 @@ const char *job_profile_name(const struct job_profile *profile)
     return profile->bowl.given ? profile->bowl.photograph[0].picture.file : profile->file;
 }
 
+const char *job_profile_mode(const struct job_profile *profile)
+{
+    return profile->mode[0] == '\0' || strcmp(profile->mode, "all") == 0 ? NULL : profile->mode;
+}
+
 enum job_kind job_sections_kind(const struct job_sections *section)
 {
     if (section->rows->n_photograph > 0 || section->rows->measurement_file[0] != '\0') return JOB_OF_FIT;

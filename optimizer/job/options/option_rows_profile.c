@@ -7,6 +7,7 @@
 #define BOWL(member) INTO(profile, bowl.member)
 #define BOWL_NUMBERS(member) NUMBERS_INTO(profile, bowl.member)
 
+static const char *const job_profile_modes[] = {"all", "R", "TT", "TRT", "TRRT", NULL};
 static const char *const job_bowl_channels[] = {"grey", "rgb", NULL};
 
 const struct job_option option_rows_profile[] = {
@@ -26,8 +27,7 @@ const struct job_option option_rows_profile[] = {
      INTO(profile, file),
      .left_out = "this or `profile.bowl`",
      .allowed = "CSV, section 3",
-     .meaning = "The table of a goniometer, with the columns `theta_o_deg`, `phi_deg` and `radiance`. Upload it with "
-                "the role `profile`."},
+     .meaning = "The table of a goniometer. Upload it with the role `profile`."},
     {.path = "profile.theta_i_deg",
      .kind = OPTION_NUMBER,
      INTO(profile, theta_i_deg),
@@ -41,16 +41,29 @@ const struct job_option option_rows_profile[] = {
      RANGE(1e-12, 1e12),
      .left_out = "fitted",
      .meaning = "The value of the file that stands for a radiance of 1 where the irradiance across the light's "
-                "direction is 1. Leave it out for relative values: what the fiber absorbs is then seen in the shape of "
-                "the profile alone."},
+                "direction is 1. Leave it out for relative values."},
+    {.path = "profile.turn_deg",
+     .kind = OPTION_NUMBER,
+     .id = OPTION_PROFILE_TURN,
+     INTO(profile, turn_deg),
+     RANGE(-360, 360),
+     .unit = "degrees",
+     .left_out = "fitted",
+     .meaning = "Turn of a flat section: `phi_i_deg` of light along its short axis."},
+    {.path = "profile.mode",
+     .kind = OPTION_WORD,
+     .id = OPTION_PROFILE_MODE,
+     TEXT_INTO(profile, mode),
+     .choice = job_profile_modes,
+     .meaning = "The mode that the profile shows alone; `elliptical_oriented.v1` has them."},
     {.path = "profile.bowl",
      .kind = OPTION_SECTION,
      BOWL(given),
      .check = job_check_bowl,
      .left_out = "this or `profile.file`",
      .meaning =
-         "The profile from photographs of a bowl: a matte part of a sphere below the fiber, lit in the middle and "
-         "photographed from above (docs/fiber-bowl.md). Places are in millimetres from the center of the sphere."},
+         "Photographs of a matte bowl below the fiber (docs/fiber-bowl.md). Places are in millimetres from the center "
+         "of the sphere."},
     {.path = "profile.bowl.radius_mm",
      .kind = OPTION_NUMBER,
      BOWL(radius_mm),
@@ -194,6 +207,13 @@ const struct job_option option_rows_profile[] = {
      .unit = "degrees",
      .meaning = "Azimuth of the lamp about the fiber: 0 on the side of +y at the height of the fiber, 180 on the side "
                 "of -y. 90 would be below the bowl."},
+    {.path = "profile.bowl.photographs[].fiber_turn_deg",
+     .kind = OPTION_NUMBER,
+     INTO_OF(struct job_bowl_photograph, fiber_turn_deg),
+     RANGE(-360, 360),
+     .standard = "0",
+     .unit = "degrees",
+     .meaning = "Turn of the fiber in its holder, in the sense of `phi_i_deg`."},
     PICTURE("profile.bowl.photographs[]", INTO_PICTURE, job_transfer_names),
     EXPOSURES("profile.bowl.photographs[]", struct job_bowl_photograph, picture.exposure, picture.n_exposure,
               "More exposures of the same view, merged as those of `photographs[].more_exposures`."),

@@ -100,6 +100,7 @@ static status append_rows(struct view *v, const struct bowl_cells *cells, struct
         if (!bowl_cells_value(cells, i, row.radiance, row.se)) continue;
         bowl_cells_middle(cells, i, &theta_deg, &azimuth_deg);
         row.theta_o_rad = theta_deg * RAD_PER_DEG;
+        row.phi_i_rad = wrap_deg(shot->phi_i_deg - shot->fiber_turn_deg) * RAD_PER_DEG;
         row.phi_rad = wrap_deg(azimuth_deg - shot->phi_i_deg) * RAD_PER_DEG;
         profile->row[profile->n++] = row;
         v->shot.n_cell++;
@@ -145,7 +146,7 @@ status bowl_profile_load(struct fiber_profile *profile, const struct job_bowl *b
                          struct job_rows *rows, const char *folder, struct bowl_record *record, struct error *err)
 {
     struct bowl_pictures pictures;
-    *profile = (struct fiber_profile){.n_channel = bowl->is_rgb ? 3 : 1, .has_se = true};
+    *profile = (struct fiber_profile){.n_channel = bowl->is_rgb ? 3 : 1, .has_se = true, .has_phi_i = true};
     if (record != NULL) *record = (struct bowl_record){.n_shot = bowl->n_photograph};
     status s = bowl_pictures_init(&pictures, bowl, setup, rows, folder, err);
     for (size_t i = 0; i < bowl->n_photograph && s == STATUS_OK; i++)

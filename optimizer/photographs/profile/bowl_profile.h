@@ -8,6 +8,8 @@
  * each pixel (bowl_place.h), and the samples become cells (bowl_cells.h). Radiances have no absolute scale: the fit has
  * one.
  *
+ * The azimuth of the light about the fiber is known too: the lamp's, less the turn of the fiber in its holder.
+ *
  * Masked and saturated places count with the mean of all other places. */
 #ifndef SELVEDGE_OPTIMIZER_BOWL_PROFILE_H
 #define SELVEDGE_OPTIMIZER_BOWL_PROFILE_H

@@ -16,15 +16,16 @@ enum column {
     COLUMN_PHI,
     COLUMN_N_REQUIRED,
     COLUMN_THETA_I = COLUMN_N_REQUIRED,
+    COLUMN_PHI_I,
     COLUMN_GREY,
     COLUMN_R,
     COLUMN_GREY_SE = COLUMN_R + 3,
     COLUMN_R_SE
 };
 
-static const char *const column_name[] = {"theta_o_deg",   "phi_deg",       "theta_i_deg",   "radiance",
-                                          "radiance_r",    "radiance_g",    "radiance_b",    "radiance_se",
-                                          "radiance_r_se", "radiance_g_se", "radiance_b_se", NULL};
+static const char *const column_name[] = {
+    "theta_o_deg", "phi_deg",     "theta_i_deg",   "phi_i_deg",     "radiance",      "radiance_r", "radiance_g",
+    "radiance_b",  "radiance_se", "radiance_r_se", "radiance_g_se", "radiance_b_se", NULL};
 
 enum { MAX_TABLE_BYTES = 16 << 20 };
 static const double most_theta_deg = 89.9, most_phi_deg = 360.0, most_radiance = 1e12, least_brightest = 1e-12,
@@ -64,6 +65,7 @@ static status check_header(void *context, struct number_table *t, struct error *
         return missing_column(t, COLUMN_THETA_I, ", and the job states no angle of the light for all rows", err);
     if (stated && number_table_has(t, COLUMN_THETA_I)) return both_given(t, "theta_i_deg", "the job's", err);
     r->profile->n_channel = grey ? 1 : 3;
+    r->profile->has_phi_i = number_table_has(t, COLUMN_PHI_I);
     const size_t first = grey ? COLUMN_GREY : COLUMN_R, first_se = grey ? COLUMN_GREY_SE : COLUMN_R_SE;
     size_t n_se = 0;
     for (size_t c = 0; c < r->profile->n_channel; c++) {
@@ -113,7 +115,7 @@ static status read_row(void *context, struct number_table *t, struct error *err)
 {
     struct reader *r = context;
     struct profile_row row = {.theta_i_rad = 0.0};
-    double theta_i = r->theta_i_deg, theta_o, phi;
+    double theta_i = r->theta_i_deg, theta_o, phi, phi_i = 0.0;
     r->profile->last_line = t->line;
     if (r->profile->n >= PROFILE_MAX_ROW)
         return number_table_error(t, STATUS_TOO_LARGE, "more than %d rows", t->file, t->line, PROFILE_MAX_ROW);
@@ -121,12 +123,15 @@ static status read_row(void *context, struct number_table *t, struct error *err)
     if (s == STATUS_OK) s = number_table_angle(t, COLUMN_PHI, -most_phi_deg, most_phi_deg, &phi, err);
     if (s == STATUS_OK && number_table_has(t, COLUMN_THETA_I))
         s = number_table_angle(t, COLUMN_THETA_I, -most_theta_deg, most_theta_deg, &theta_i, err);
+    if (s == STATUS_OK && r->profile->has_phi_i)
+        s = number_table_angle(t, COLUMN_PHI_I, -most_phi_deg, most_phi_deg, &phi_i, err);
     if (s == STATUS_OK) s = read_radiance(r, t, &row, err);
     if (s != STATUS_OK) return s;
-    angle_span_add(&r->span, number_table_has(t, COLUMN_THETA_I) ? theta_i : 0.0, 0.0, theta_o, phi, 0.0);
+    angle_span_add(&r->span, number_table_has(t, COLUMN_THETA_I) ? theta_i : 0.0, phi_i, theta_o, phi, 0.0);
     row.theta_i_rad = theta_i * RAD_PER_DEG;
     row.theta_o_rad = theta_o * RAD_PER_DEG;
     row.phi_rad = phi * RAD_PER_DEG;
+    row.phi_i_rad = phi_i * RAD_PER_DEG;
     return append(r, &row, err);
 }
 
@@ -171,13 +176,17 @@ status fiber_profile_load(struct fiber_profile *profile, const struct job_profil
     if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_PROFILE_FILE);
     if (s == STATUS_OK) s = fiber_profile_parse(profile, text, n, asked->file, asked->theta_i_deg, err);
     free(text);
-    return s;
+    if (s != STATUS_OK || isnan(asked->turn_deg) || profile->has_phi_i) return s;
+    fiber_profile_release(profile);
+    return error_set_field(err, STATUS_INVALID, OPTION_PROFILE_TURN,
+                           "the turn of the section is given, but table '%s' has no column '%s' that it is counted in",
+                           asked->file, column_name[COLUMN_PHI_I]);
 }
 
 void fiber_profile_print(const struct fiber_profile *profile, FILE *out)
 {
     static const char *const channel[] = {"_r", "_g", "_b"};
-    fputs("theta_i_deg,theta_o_deg,phi_deg", out);
+    fprintf(out, "theta_i_deg,%stheta_o_deg,phi_deg", profile->has_phi_i ? "phi_i_deg," : "");
     for (size_t c = 0; c < profile->n_channel; c++) {
         const char *name = profile->n_channel == 1 ? "" : channel[c];
         fprintf(out, profile->has_se ? ",radiance%s,radiance%s_se" : ",radiance%s", name, name);
@@ -185,8 +194,9 @@ void fiber_profile_print(const struct fiber_profile *profile, FILE *out)
     fputs("\n", out);
     for (size_t i = 0; i < profile->n; i++) {
         const struct profile_row *row = &profile->row[i];
-        fprintf(out, "%.6g,%.6g,%.6g", angle_to_deg(row->theta_i_rad), angle_to_deg(row->theta_o_rad),
-                angle_to_deg(row->phi_rad));
+        fprintf(out, "%.6g,", angle_to_deg(row->theta_i_rad));
+        if (profile->has_phi_i) fprintf(out, "%.6g,", angle_to_deg(row->phi_i_rad));
+        fprintf(out, "%.6g,%.6g", angle_to_deg(row->theta_o_rad), angle_to_deg(row->phi_rad));
         for (size_t c = 0; c < profile->n_channel; c++) {
             fprintf(out, ",%.7g", row->radiance[c]);
             if (profile->has_se) fprintf(out, ",%.4g", row->se[c]);

@@ -17,6 +17,12 @@ static json_t *model_json(const struct report *report, size_t i)
                              m->setup->appearance.title, "best", (int)(i == report_best_model(report)), "parameters",
                              result_parameters_json(m), "scale", json_number(f->scale), "scale_se",
                              json_number(f->scale_se), "scale_fitted", (int)isnan(report->in.profile->scale));
+    if (f->has_turn) {
+        json_object_set_new(json, "turn_deg", json_number(angle_to_deg(f->turn_rad)));
+        json_object_set_new(json, "turn_se_deg", json_number(angle_to_deg(f->turn_se_rad)));
+        json_object_set_new(json, "turn_fitted", json_boolean(isnan(report->in.profile->turn_deg)));
+        json_object_set_new(json, "turn_determined", json_boolean(f->turn_determined));
+    }
     json_object_set_new(json, "nrmse", json_number(f->nrmse));
     json_object_set_new(json, "rel_rms", json_number(f->rel_rms));
     json_object_set_new(json, "misfit", json_number(f->misfit));
@@ -34,18 +40,22 @@ static json_t *model_json(const struct report *report, size_t i)
 static json_t *table_json(const struct report *report)
 {
     const struct fiber_profile *p = &report->in.fiber->profile;
-    double range[3][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+    double range[4][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}, {INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
     for (size_t i = 0; i < p->n; i++) {
-        const double angle[3] = {p->row[i].theta_i_rad, p->row[i].theta_o_rad, p->row[i].phi_rad};
-        for (int k = 0; k < 3; k++) {
+        const double angle[4] = {p->row[i].theta_i_rad, p->row[i].theta_o_rad, p->row[i].phi_rad, p->row[i].phi_i_rad};
+        for (int k = 0; k < 4; k++) {
             range[k][0] = fmin(range[k][0], angle_to_deg(angle[k]));
             range[k][1] = fmax(range[k][1], angle_to_deg(angle[k]));
         }
     }
-    return json_pack("{s:s, s:o, s:o, s:b, s:o, s:o, s:o}", "file", job_profile_name(report->in.profile), "n_row",
-                     json_count(p->n), "n_channel", json_count(p->n_channel), "has_errors", (int)p->has_se,
-                     "theta_i_deg", json_number_list(range[0], 2, 1.0), "theta_o_deg",
-                     json_number_list(range[1], 2, 1.0), "phi_deg", json_number_list(range[2], 2, 1.0));
+    json_t *json = json_pack("{s:s, s:o, s:o, s:b, s:o, s:o, s:o}", "file", job_profile_name(report->in.profile),
+                             "n_row", json_count(p->n), "n_channel", json_count(p->n_channel), "has_errors",
+                             (int)p->has_se, "theta_i_deg", json_number_list(range[0], 2, 1.0), "theta_o_deg",
+                             json_number_list(range[1], 2, 1.0), "phi_deg", json_number_list(range[2], 2, 1.0));
+    if (p->has_phi_i) json_object_set_new(json, "phi_i_deg", json_number_list(range[3], 2, 1.0));
+    const char *mode = job_profile_mode(report->in.profile);
+    if (mode != NULL) json_object_set_new(json, "mode", json_string(mode));
+    return json;
 }
 
 /* Returns the steps from the photographs of a bowl to the table; NULL without photographs. */
@@ -94,14 +104,15 @@ status profile_csv_write(const struct report *report, struct error *err)
     size_t n = 0;
     FILE *out = open_memstream(&text, &n);
     if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the profile: out of memory");
-    fputs("theta_i_deg,theta_o_deg,phi_deg,channel,radiance", out);
+    fprintf(out, "theta_i_deg,%stheta_o_deg,phi_deg,channel,radiance", p->has_phi_i ? "phi_i_deg," : "");
     for (size_t i = 0; i < report->n_model; i++) fprintf(out, ",%s", report->model[i].setup->appearance.id);
     fputs("\n", out);
     for (size_t k = 0; k < p->n * p->n_channel; k++) {
         const struct profile_row *row = &p->row[k / p->n_channel];
-        fprintf(out, "%.6g,%.6g,%.6g,%s,%.9g", angle_to_deg(row->theta_i_rad), angle_to_deg(row->theta_o_rad),
-                angle_to_deg(row->phi_rad), p->n_channel == 1 ? "grey" : (const char *[]){"r", "g", "b"}[k % 3],
-                row->radiance[k % p->n_channel]);
+        fprintf(out, "%.6g,", angle_to_deg(row->theta_i_rad));
+        if (p->has_phi_i) fprintf(out, "%.6g,", angle_to_deg(row->phi_i_rad));
+        fprintf(out, "%.6g,%.6g,%s,%.9g", angle_to_deg(row->theta_o_rad), angle_to_deg(row->phi_rad),
+                p->n_channel == 1 ? "grey" : (const char *[]){"r", "g", "b"}[k % 3], row->radiance[k % p->n_channel]);
         for (size_t i = 0; i < report->n_model; i++) fprintf(out, ",%.9g", report->model[i].fit->profile.value[k]);
         fputs("\n", out);
     }
@@ -124,6 +135,8 @@ void profile_print(const struct report *report, size_t i, FILE *out)
     if (isfinite(f->chi_square)) fprintf(out, "; %.3g times the stated variance", f->chi_square);
     fprintf(out, "\nscale    %.5g", f->scale);
     if (f->scale_se > 0.0) fprintf(out, " +- %.2g", f->scale_se);
+    if (f->has_turn) fprintf(out, "\nturn     %.4g degrees", angle_to_deg(f->turn_rad));
+    if (f->has_turn && f->turn_se_rad > 0.0) fprintf(out, " +- %.2g", angle_to_deg(f->turn_se_rad));
     fprintf(out, "\nstarts   %zu of %zu came to this result%s\n", f->n_agree, f->n_start,
             f->converged ? "" : "; the steps ended before the residual was at its least");
 }

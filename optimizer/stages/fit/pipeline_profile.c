@@ -1,5 +1,6 @@
 /* The stage "fit" of a job with the profile of a single fiber: fits every model to it. A
  * fit takes seconds, so an interrupted job begins anew. */
+#include "base/angle.h"
 #include "base/option_id.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_profile.h"
@@ -56,6 +57,8 @@ status stage_profile_fit(const struct profile_fit_input *in, struct fit_output *
                                                 .parameter = m->parameter,
                                                 .option = &option,
                                                 .scale = in->asked->scale,
+                                                .turn_rad = in->asked->turn_deg * RAD_PER_DEG,
+                                                .mode = job_profile_mode(in->asked),
                                                 .max_iteration = in->fit->max_iteration,
                                                 .pool = in->tools->pool,
                                                 .progress = &progress};

@@ -8,6 +8,7 @@
 #include "renderer/scattering/scattering_state.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 #define LEAST_PROBABILITY 0.03f /* of a mode: no mode is starved, because all carry derivatives */
 
@@ -266,9 +267,25 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
     fiber_direction_beyond(&out.direction, sinf(theta), fmaxf(cosf(theta), 0), cosf(turn), sinf(out.mirror * turn), wi);
 }
 
+/* TRRT has the rest with it. */
+static const char *const mode[ELLIPTICAL_N_LOBE + 1] = {"R", "TT", "TRT", "TRRT", NULL};
+
+static void keep_mode(struct scattering_state *s, size_t kept)
+{
+    const size_t n_cell = sizeof s->cell / sizeof s->cell[0][0][0];
+    for (size_t i = 0; i < n_cell; i++)
+        for (size_t p = 0; p < ELLIPTICAL_N_LOBE; p++) {
+            if (p == kept) continue;
+            memset((&s->cell[0][0][0] + i)->n[p], 0, sizeof s->cell[0][0][0].n[p]);
+            memset((&s->slope[0][0][0] + i)->n[p], 0, sizeof s->slope[0][0][0].n[p]);
+        }
+}
+
 const struct scattering_model scattering_elliptical_oriented = {
     SURFACE_MODEL_ROW(elliptical_oriented),
     .flat_section = true,
+    .mode = mode,
+    .keep_mode = keep_mode,
     .width = width,
     .prepare = prepare,
     .prepare_shared = prepare_shared,

@@ -107,7 +107,7 @@ def test_the_table_alone(folder):
     done = run(folder / "job.json", "--out", folder / "p.csv", "--picture", folder / "p.png")
     assert done.returncode == 0 and "camera at" in done.stdout, done.stderr
     lines = (folder / "p.csv").read_text().splitlines()
-    assert lines[0] == "theta_i_deg,theta_o_deg,phi_deg,radiance,radiance_se" and len(lines) > 150
+    assert lines[0] == "theta_i_deg,phi_i_deg,theta_o_deg,phi_deg,radiance,radiance_se" and len(lines) > 150
     true, values = SCALE * ALBEDO / math.pi**2 * math.cos(math.radians(THETA_I)), [list(map(float, line.split(","))) for line in lines[1:]]
     squares = sum(((v[3] - true) / v[4])**2 for v in values) / len(values)
     assert 1 - 4 * math.sqrt(2 / len(values)) < squares < 18 / 16 + 4 * math.sqrt(2 / len(values))

@@ -68,6 +68,46 @@ def test_the_result(real, finished):
     assert done == {"fit"}, "the report is not done while it is written"
 
 
+def turned_table():
+    """Light of a section that is turned by 50 degrees: 20 % brighter where light comes along its short axis."""
+    rng, lines = random.Random(4), ["phi_i_deg,theta_o_deg,phi_deg,radiance,radiance_se"]
+    for phi_i in range(0, 360, 30):
+        for phi in range(0, 360, 30):
+            true = 0.1 * (1 + 0.2 * math.cos(2 * math.radians(phi_i - 50)) + 0.1 * math.cos(2 * math.radians(phi_i + phi - 50)))
+            lines.append(f"{phi_i},40,{phi},{true * (1 + 0.02 * rng.gauss(0, 1)):.6g},{0.02 * true:.4g}")
+    return "\n".join(lines) + "\n"
+
+
+def test_azimuths_of_the_light(real):
+    """A model of flat fibers has a turn; a round one has none. The table is shown with its azimuths."""
+    document = {"sample": "ribbon", "profile": {"file": "fiber.csv", "theta_i_deg": -40}, "fit": {"models": ["textile.v3", "isotropic.v1"]}}
+    job = start(real, document, [("fiber.csv", "profile", turned_table().encode())])
+    result = real.wait_state(job, "succeeded", timeout_s=120)["result"]
+    with open(os.path.join(ROOT, "config", "result.schema.json"), encoding="utf-8") as f:
+        jsonschema.validate(result, json.load(f))
+    flat, even = result["profile"]["models"]
+    assert result["profile"]["table"]["phi_i_deg"] == pytest.approx([0, 330]) and "turn_deg" not in even and flat["bic"] < even["bic"]
+    off = (flat["turn_deg"] - 50 + 45) % 90 - 45
+    assert flat["turn_fitted"] and flat["turn_determined"] and 0 <= flat["turn_deg"] < 180 and abs(off) < 5, flat["turn_deg"]
+    lines = real.get(f"/v1/jobs/{job}/results/profile.csv").text.splitlines()
+    assert lines[0] == "theta_i_deg,phi_i_deg,theta_o_deg,phi_deg,channel,radiance,textile.v3,isotropic.v1" and len(lines) == 145
+    page, summary = (real.get(f"/v1/jobs/{job}/results/{name}").text for name in ("report.html", "summary.txt"))
+    assert "phi_i 330" in page and "turn of the section" in page and "turn " in summary
+
+
+@pytest.mark.parametrize("profile,field,says", [
+    ({"turn_deg": 20}, "profile.turn_deg", "'phi_i_deg'"),
+    ({"mode": "TRT"}, "profile.mode", "isotropic.v1"),
+])
+def test_turns_and_modes_that_are_refused(tmp_path, profile, field, says):
+    (tmp_path / "input").mkdir()
+    (tmp_path / "input" / "fiber.csv").write_text(table())
+    (tmp_path / "job.json").write_text(json.dumps({**DOCUMENT, "profile": {**DOCUMENT["profile"], **profile}, "fit": {"model": "isotropic.v1"}}))
+    done = subprocess.run([program("selvedge-worker"), str(tmp_path)], capture_output=True, text=True, timeout=300)
+    error = json.loads((tmp_path / "status.json").read_text())["error"]
+    assert done.returncode != 0 and error["field"] == field and says in error["text"], error
+
+
 def test_a_residual_far_above_the_noise_is_not_good(real):
     """A fiber with a strong highlight, to which a model without one is fitted."""
     lines = ["theta_o_deg,phi_deg,radiance,radiance_se"]
@@ -152,7 +192,7 @@ def test_tables_that_are_refused(tmp_path, text, says):
     ({**DOCUMENT, "fit": {"method": "published_sgd.v1"}}, "fit.method"),
     ({**DOCUMENT, "fibers": {"file": "a.hair"}}, "fibers"), ({**DOCUMENT, "black_sheet": True}, "black_sheet"),
     ({**DOCUMENT, "fit": {"model": "microflake.v1"}}, "fit.models"), ({**DOCUMENT, "fit": {"path_budget": 5000}}, "fit.path_budget"),
-    ({**DOCUMENT, "profile": {"file": "a.csv", "theta_i_deg": 95}}, "profile.theta_i_deg"), ({**DOCUMENT, "profile": {}}, "profile.file"),
+    ({**DOCUMENT, "profile": {"file": "a.csv", "mode": "E"}}, "profile.mode"), ({**DOCUMENT, "profile": {"file": "a.csv", "theta_i_deg": 95}}, "profile.theta_i_deg"), ({**DOCUMENT, "profile": {}}, "profile.file"),
     ({**DOCUMENT, "fit": {"fixed": {"C_R": 0.1, "C_TT": 0.5}, "model": "two_lobe.v1", "bounds": {"beta_R": [9, 3]}}}, "fit.bounds.beta_R"),
 ])
 def test_documents_that_are_refused(real, document, field):

@@ -25,7 +25,7 @@
 #define ONE "\"photographs\":[{\"file\":\"a.exr\",\"background\":\"dark.exr\",\"theta_i_deg\":20}]"
 #define BOTH                                                                                                           \
     "\"photographs\":[{\"file\":\"a.exr\",\"background\":\"dark.exr\",\"theta_i_deg\":20},"                            \
-    "{\"file\":\"b.exr\",\"background\":\"dark.exr\",\"theta_i_deg\":-15,\"phi_i_deg\":180}]"
+    "{\"file\":\"b.exr\",\"background\":\"dark.exr\",\"theta_i_deg\":-15,\"phi_i_deg\":180,\"fiber_turn_deg\":40}]"
 enum { PX = 320, TEXT = 4096 };
 
 static struct bowl_device device_of(const struct scattering_model *m, const struct scattering_state *state)
@@ -142,7 +142,10 @@ static void known_profile(void **state)
     assert_non_null(truth);
     assert_int_equal(profile_model_predict(s.model, s.truth, &p, &(struct profile_work){0}, truth, NULL, &err),
                      STATUS_OK);
+    assert_true(p.has_phi_i); /* the second photograph is from the other side, of a fiber turned by 40 degrees */
     for (size_t i = 0; i < p.n; i++) {
+        const double phi_i_deg = p.row[i].theta_i_rad > 0 ? 0 : 140;
+        assert_true(fabs(p.row[i].phi_i_rad - phi_i_deg * RAD_PER_DEG) < 1e-9);
         chi_square += pow((p.row[i].radiance[0] - truth[i]) / p.row[i].se[0], 2) / (double)p.n;
         mean += truth[i] / (double)p.n;
         noise += p.row[i].se[0] / (double)p.n;

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -38,6 +39,34 @@ static void grey_and_colored(void **unused)
     fiber_profile_release(&p);
 }
 
+/* Azimuths of the light, in degrees; and what is printed is read again. */
+static void azimuths_of_the_light(void **unused)
+{
+    static const char table[] = "phi_i_deg,theta_o_deg,phi_deg,radiance\n-90,10,-20,0.5\n350,40,180,2\n";
+    struct fiber_profile p, again;
+    struct error err = {0};
+    char *text = NULL;
+    size_t n = 0;
+    (void)unused;
+    assert_int_equal(parse(table, -40, &p, &err), STATUS_OK);
+    assert_true(p.has_phi_i && fabs(p.row[0].phi_i_rad + M_PI_2) < 1e-12);
+    assert_true(fabs(p.row[1].phi_i_rad - 350 * RAD_PER_DEG) < 1e-12);
+    FILE *out = open_memstream(&text, &n);
+    assert_non_null(out);
+    fiber_profile_print(&p, out);
+    fclose(out);
+    assert_string_equal(text, "theta_i_deg,phi_i_deg,theta_o_deg,phi_deg,radiance\n-40,-90,10,-20,0.5\n"
+                              "-40,350,40,180,2\n");
+    assert_int_equal(parse(text, NAN, &again, &err), STATUS_OK);
+    for (size_t i = 0; i < 2; i++) assert_true(fabs(again.row[i].phi_i_rad - p.row[i].phi_i_rad) < 1e-6);
+    fiber_profile_release(&again);
+    fiber_profile_release(&p);
+    free(text);
+    assert_int_equal(parse("theta_o_deg,phi_deg,radiance\n10,0,1\n", 0, &p, &err), STATUS_OK);
+    assert_true(!p.has_phi_i && !(fabs(p.row[0].phi_i_rad) > 0));
+    fiber_profile_release(&p);
+}
+
 static void refused(void **unused)
 {
     static const struct {
@@ -66,6 +95,11 @@ static void refused(void **unused)
         {"theta_o_deg,phi_deg,radiance\n.17,-.35,1\n.35,3.14,2\n.87,3.49,1\n",
          0,
          {"line 4", "'theta_o_deg' and 'phi_deg'", "radians"}},
+        {"phi_i_rad,theta_o_deg,phi_deg,radiance\n1,1,1,1\n", 0, {"line 1", "unknown column 'phi_i_rad'"}},
+        {"phi_i_deg,theta_o_deg,phi_deg,radiance\n0,10,0,1\n-361,10,0,1\n",
+         0,
+         {"line 3", "'phi_i_deg' is -361", "-360 to 360"}},
+        {"phi_i_deg,theta_o_deg,phi_deg,radiance\nx,10,0,1\n", 0, {"line 2", "'phi_i_deg'", "'x' is not a number"}},
         {"theta_o_deg,phi_deg,radiance\n", 0, {"line 1", "no row"}},
         {"theta_o_deg,phi_deg,radiance\n10,0,0\n20,0,0\n", 0, {"line 3", "'radiance' is 0"}},
         {"theta_o_deg,phi_deg,radiance\n10,0,0\n20,0,1e-200\n", 0, {"line 3", "'radiance' is 1e-200", "another unit"}},
@@ -85,6 +119,7 @@ static void refused(void **unused)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(grey_and_colored), cmocka_unit_test(refused)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(grey_and_colored), cmocka_unit_test(azimuths_of_the_light),
+                                       cmocka_unit_test(refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
