@@ -1,5 +1,7 @@
 #include "renderer/glint/glint_cells.h"
 
+#include "renderer/glint/glint_window.h"
+
 #include <math.h>
 #include <stdlib.h>
 
@@ -87,21 +89,6 @@ void glint_cells_release(struct glint_cells *c)
     *c = (struct glint_cells){0};
 }
 
-/* Tiles of one row, counted on over the periods, that the footprint reaches. y: of the row's tiles in micrometres
- * from the center. Returns false when there is none. */
-static bool row_range(const struct glint_query *q, float tile_um, const float y[2], int64_t range[2])
-{
-    const float nearest = y[0] > 0 ? y[0] : y[1] < 0 ? y[1] : 0, lean = q->wide[1] / q->wide[2];
-    const float left = 1 - nearest * nearest / (GLINT_REACH * GLINT_REACH * q->wide[2]);
-    if (left <= 0) return false;
-    const float half = GLINT_REACH * sqrtf(fmaxf(q->wide[0] - lean * q->wide[1], 0) * left);
-    range[0] = (int64_t)floorf((q->center_um[0] + fminf(lean * y[0], lean * y[1]) - half) / tile_um);
-    range[1] = (int64_t)floorf((q->center_um[0] + fmaxf(lean * y[0], lean * y[1]) + half) / tile_um);
-    return true;
-}
-
-static int64_t floor_div(int64_t a, int64_t b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
-
 /* Sum over a row of tiles, cut where the map repeats. */
 static float row_sum(const struct glint_cells *c, const struct glint_lattice *l, const struct glint_query *q,
                      const uint32_t *start, const int64_t range[2], float shift_v_um, const float half[2])
@@ -109,7 +96,8 @@ static float row_sum(const struct glint_cells *c, const struct glint_lattice *l,
     const int64_t n = (int64_t)c->n_tile;
     float sum = 0;
     for (int64_t x = range[0]; x <= range[1];) {
-        const int64_t period = floor_div(x, n), end = range[1] < (period + 1) * n - 1 ? range[1] : (period + 1) * n - 1;
+        const int64_t period = glint_floor_div(x, n),
+                      end = range[1] < (period + 1) * n - 1 ? range[1] : (period + 1) * n - 1;
         const uint32_t first = start[x - period * n], last = start[end - period * n + 1];
         const float shift[2] = {(float)period * l->period_um, shift_v_um};
         if (last > first) sum += glint_query_sum(q, l->element, c->index + first, last - first, shift, half);
@@ -121,18 +109,20 @@ static float row_sum(const struct glint_cells *c, const struct glint_lattice *l,
 float glint_cells_sum(const struct glint_cells *c, const struct glint_lattice *l, const struct glint_query *q,
                       const float half[2])
 {
-    const float tile_um = GLINT_TILE * l->step_um, high = GLINT_REACH * sqrtf(q->wide[2]);
-    const int64_t n = (int64_t)c->n_tile, row[2] = {(int64_t)floorf((q->center_um[1] - high) / tile_um),
-                                                    (int64_t)floorf((q->center_um[1] + high) / tile_um)};
+    const struct glint_window w = {.center_um = {q->center_um[0], q->center_um[1]},
+                                   .covariance_um2 = {q->wide[0], q->wide[1], q->wide[2]},
+                                   .reach = GLINT_REACH,
+                                   .tile_um = GLINT_TILE * l->step_um};
     const float at[2] = {(half[0] - c->least[0]) * c->per_cell[0], (half[1] - c->least[1]) * c->per_cell[1]};
+    const int64_t n = (int64_t)c->n_tile;
     float sum = 0;
+    int64_t row[2], range[2];
     if (!(at[0] >= 0 && at[1] >= 0 && at[0] < GLINT_N_CELL && at[1] < GLINT_N_CELL)) return 0;
     const uint32_t *start = c->start + (size_t)((int)at[1] * GLINT_N_CELL + (int)at[0]) * c->n_tile * c->n_tile;
+    glint_window_rows(&w, row);
     for (int64_t k = row[0]; k <= row[1]; k++) {
-        const int64_t period = floor_div(k, n);
-        const float y[2] = {(float)k * tile_um - q->center_um[1], (float)(k + 1) * tile_um - q->center_um[1]};
-        int64_t range[2];
-        if (!row_range(q, tile_um, y, range)) continue;
+        const int64_t period = glint_floor_div(k, n);
+        if (!glint_window_row(&w, k, range)) continue;
         sum += row_sum(c, l, q, start + (k - period * n) * n, range, (float)period * l->period_um, half);
     }
     return sum;
