@@ -7,8 +7,10 @@ static const struct {
     const char *name;
     bool is_reciprocal, has_fixed_phase, has_tilt;
 } row[WAVE_N_MODEL] = {
-    [WAVE_OHS] = {"ohs", false, true, false},           [WAVE_GHS] = {"ghs", false, false, false},
-    [WAVE_R_OHS] = {"r_ohs", true, true, false},        [WAVE_R_GHS] = {"r_ghs", true, false, false},
+    [WAVE_OHS] = {"ohs", false, true, false},
+    [WAVE_GHS] = {"ghs", false, false, false},
+    [WAVE_R_OHS] = {"r_ohs", true, true, false},
+    [WAVE_R_GHS] = {"r_ghs", true, false, false},
     [WAVE_KIRCHHOFF] = {"kirchhoff", true, false, true},
 };
 

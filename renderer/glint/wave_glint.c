@@ -123,8 +123,7 @@ size_t wave_glint_value(const struct wave_glint *g, const struct wave_glint_quer
     const struct wave_window window = {{q->center_um[0], q->center_um[1]}, g->window_um};
     /* the standard deviation of a kernel is lambda / (2 pi sigma) = lambda / (pi l) */
     const float reach = is_pruned ? REACH * longest_um / ((float)M_PI * g->tree.step_um) : INFINITY;
-    const struct wave_direction d = {
-        {factor.psi[0], factor.psi[1]}, factor.xi_3, reach, factor.xi_3 * factor.xi_3};
+    const struct wave_direction d = {{factor.psi[0], factor.psi[1]}, factor.xi_3, reach, factor.xi_3 * factor.xi_3};
     wave_tree_gather(&g->tree, &window, &d, &k);
     if (factor.per_psi_n > 0)
         for (size_t i = 0; i < k.n; i++) k.weight[i] *= 1 - k.tilt[i] * factor.per_psi_n;

@@ -24,7 +24,8 @@ void wave_glint_set_blur(struct wave_glint *g, const struct wave_height *h)
                       pow((double)(h->slope_v[up] - h->slope_v[at]), 2);
         }
     const double curve = 2 * M_PI * 2 / SAMPLE_UM * sqrt(square / (2.0 * (double)(n * n))) / texel;
-    const double kernel = 0.5 * (double)g->tree.step_um, size = fmin(fmax(1 / sqrt(fmax(curve, 1e-12)), kernel), g->coherence_um);
+    const double kernel = 0.5 * (double)g->tree.step_um,
+                 size = fmin(fmax(1 / sqrt(fmax(curve, 1e-12)), kernel), g->coherence_um);
     /* of the direction psi it is lambda / (2 sqrt(2) pi size), and a slope is half of it */
     g->narrow = (float)(SAMPLE_UM / (4 * M_SQRT2 * M_PI * size));
     g->wide = (float)(SAMPLE_UM / (4 * M_SQRT2 * M_PI * kernel));
@@ -68,8 +69,7 @@ bool wave_glint_sample(const struct wave_glint *g, const double center_um[2], co
 {
     if (!(wi[2] > 0)) return false;
     /* w^2 is a Gaussian with the standard deviation sd / sqrt(2) */
-    const double radius = g->coherence_um * sqrt(-log(1 - (double)u[0] * WINDOW_SHARE)),
-                 turn = 2 * M_PI * (double)u[1];
+    const double radius = g->coherence_um * sqrt(-log(1 - (double)u[0] * WINDOW_SHARE)), turn = 2 * M_PI * (double)u[1];
     const double place_um[2] = {center_um[0] + radius * cos(turn), center_um[1] + radius * sin(turn)};
     const float sd = u[4] < WIDE_SHARE ? g->wide : g->narrow;
     const float off = sd * sqrtf(-2 * logf(1 - u[2])), around = 2 * (float)M_PI * u[3];

@@ -28,8 +28,8 @@ static status check(const struct wave_height_option *o, struct error *err)
         if (!(o->length_um[d] >= 3 * o->texel_um && o->length_um[d] <= (double)o->n * o->texel_um))
             return error_set(err, STATUS_INVALID, "a correlation length of %g um: not from 3 texels to the tile",
                              o->length_um[d]);
-    if (o->n_scratch > 0 && !(o->scratch_width_um >= 1.5 * o->texel_um && o->scratch_width_um <= 100 &&
-                              fabs(o->scratch_depth_um) <= 10))
+    if (o->n_scratch > 0 &&
+        !(o->scratch_width_um >= 1.5 * o->texel_um && o->scratch_width_um <= 100 && fabs(o->scratch_depth_um) <= 10))
         return error_set(err, STATUS_INVALID, "scratches %g um deep and %g um wide: at most 10, and from 1.5 texels",
                          o->scratch_depth_um, o->scratch_width_um);
     return STATUS_OK;
@@ -109,7 +109,8 @@ static void add_mark(struct wave_height *h, const struct scratch_mark *m)
     for (long j = (long)((m->center_um[1] - reach[1]) / texel) - 1; (double)j * texel < m->center_um[1] + reach[1]; j++)
         for (long i = (long)((m->center_um[0] - reach[0]) / texel) - 1; (double)i * texel < m->center_um[0] + reach[0];
              i++) {
-            const double x = ((double)i + 0.5) * texel - m->center_um[0], y = ((double)j + 0.5) * texel - m->center_um[1];
+            const double x = ((double)i + 0.5) * texel - m->center_um[0],
+                         y = ((double)j + 0.5) * texel - m->center_um[1];
             const double a = x * m->along[0] + y * m->along[1], b = y * m->along[0] - x * m->along[1];
             const double q = a * a * pa + b * b * pb;
             if (q > SCRATCH_REACH * SCRATCH_REACH) continue;

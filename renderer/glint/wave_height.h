@@ -18,11 +18,11 @@
 #include <stdint.h>
 
 struct wave_height_option {
-    size_t n;          /* texels along each side of the tile, a power of two of 64 to 4096 */
-    double texel_um;   /* 0.25 to 4 */
-    double rms_um;     /* of the noise; 0: none. At most 10 */
+    size_t n;            /* texels along each side of the tile, a power of two of 64 to 4096 */
+    double texel_um;     /* 0.25 to 4 */
+    double rms_um;       /* of the noise; 0: none. At most 10 */
     double length_um[2]; /* correlation lengths along u and v, of at least 3 texels and at most the tile */
-    size_t n_scratch;  /* in a tile */
+    size_t n_scratch;    /* in a tile */
     double scratch_depth_um, scratch_width_um; /* width: standard deviation of the cross-section, at least 1.5 texels */
     uint64_t seed;
 };
@@ -32,7 +32,7 @@ struct wave_height {
     size_t n;
     float texel_um;
     float *height_um, *slope_u, *slope_v; /* slopes: derivative of the height along u and v, dimensionless */
-    float *gain; /* 0 until wave_height_straighten */
+    float *gain;                          /* 0 until wave_height_straighten */
 };
 
 /* A tile of 1024 texels of 1 um with bumps of 0.35 um at a correlation length of 8 um, without scratches. */

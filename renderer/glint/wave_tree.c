@@ -52,8 +52,7 @@ static void fill_level(struct wave_tree *t, size_t level)
 status wave_tree_init(struct wave_tree *t, const struct wave_height *h, size_t stride, struct error *err)
 {
     const size_t n_leaf = h->n / stride / WAVE_LEAF;
-    *t = (struct wave_tree){
-        .n = h->n / stride, .step_um = h->texel_um * (float)stride, .first_um = 0.5F * h->texel_um};
+    *t = (struct wave_tree){.n = h->n / stride, .step_um = h->texel_um * (float)stride, .first_um = 0.5F * h->texel_um};
     t->row = malloc(n_leaf * n_leaf * WAVE_LEAF * sizeof *t->row);
     bool whole = t->row != NULL;
     for (size_t side = n_leaf; side > 0; side /= 2) {
@@ -175,4 +174,3 @@ void wave_tree_slope(const struct wave_tree *t, const double place_um[2], float 
     slope[0] = row->slope_u[i % LANES];
     slope[1] = row->slope_v[i % LANES];
 }
-

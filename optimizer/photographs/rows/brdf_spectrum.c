@@ -42,7 +42,8 @@ bool brdf_spectrum_weights(const double *nm, size_t n, double (*weight)[3])
     for (size_t i = 0; i + 1 < n; i++) add_interval(nm[i], nm[i + 1], weight[i], weight[i + 1]);
     for (size_t c = 0; c < 3; c++) { /* values beyond the ends equal the values at the ends */
         double below = 0.0, above = 0.0;
-        for (int at = OBSERVER_FIRST_NM - OBSERVER_STEP_NM; at < OBSERVER_FIRST_NM + OBSERVER_N * OBSERVER_STEP_NM; at++) {
+        for (int at = OBSERVER_FIRST_NM - OBSERVER_STEP_NM; at < OBSERVER_FIRST_NM + OBSERVER_N * OBSERVER_STEP_NM;
+             at++) {
             double middle = (double)at + 0.5;
             if (middle < nm[0]) below += observer_weight(middle, c);
             if (middle > nm[n - 1]) above += observer_weight(middle, c);

@@ -62,7 +62,8 @@ static double stationary_energy(const struct wave_glint_option *o, const float w
     if (wave_height_init(&h, &o->height, &err) != STATUS_OK) fail_msg("%s", err.text);
     const bool is_fixed = o->model == WAVE_OHS || o->model == WAVE_R_OHS, is_old = o->model < WAVE_R_OHS;
     for (size_t i = 0; i < h.n * h.n; i++) {
-        const double s[2] = {(double)h.slope_u[i], (double)h.slope_v[i]}, w[3] = {(double)wi[0], (double)wi[1], (double)wi[2]};
+        const double s[2] = {(double)h.slope_u[i], (double)h.slope_v[i]},
+                     w[3] = {(double)wi[0], (double)wi[1], (double)wi[2]};
         double wo[3], per_slope, xi_3 = 2;
         if (is_fixed) {
             for (int k = 0; k < 2; k++) wo[k] = -2 * s[k] - w[k];
@@ -117,8 +118,8 @@ static void test_a_lossless_surface_keeps_its_light(void **state)
             unit(wi, 0.5 * tilted, 0);
             const struct sample_mean mean = reflected(g, wi, (uint32_t)(2 * m + tilted), 20000);
             const double want = stationary_energy(&o, wi);
-            print_message("%s %d: reflects %.4f +- %.4f, by its slopes %.4f\n", wave_model_name(o.model), tilted, mean.mean,
-                          sample_mean_se(&mean), want);
+            print_message("%s %d: reflects %.4f +- %.4f, by its slopes %.4f\n", wave_model_name(o.model), tilted,
+                          mean.mean, sample_mean_se(&mean), want);
             assert_true(fabs(mean.mean - want) < 4 * sample_mean_se(&mean) + 0.01);
             assert_true(mean.mean > 0.95 && mean.mean < 1.02 + 4 * sample_mean_se(&mean));
             wave_glint_free(g);
@@ -200,19 +201,21 @@ static void test_samples_follow_their_density(void **state)
         for (size_t c = 0; c < N_CELL * N_CELL; c++) {
             expected[c] = 0;
             for (size_t k = 0; k < N_NODE * N_NODE; k++) {
-                const double x = low[0] + side / N_CELL * ((double)(c % N_CELL) + ((double)(k % N_NODE) + 0.5) / N_NODE);
-                const double y = low[1] + side / N_CELL * ((double)(c / N_CELL) + ((double)(k / N_NODE) + 0.5) / N_NODE);
+                const double x =
+                    low[0] + side / N_CELL * ((double)(c % N_CELL) + ((double)(k % N_NODE) + 0.5) / N_NODE);
+                const double y =
+                    low[1] + side / N_CELL * ((double)(c / N_CELL) + ((double)(k / N_NODE) + 0.5) / N_NODE);
                 if (x * x + y * y >= 1) continue;
                 unit(q.wo, x, y);
-                expected[c] += N_SAMPLE * (double)(wave_glint_pdf(g, &q) / q.wo[2]) *
-                               pow(side / (N_CELL * (double)N_NODE), 2);
+                expected[c] +=
+                    N_SAMPLE * (double)(wave_glint_pdf(g, &q) / q.wo[2]) * pow(side / (N_CELL * (double)N_NODE), 2);
             }
             inside += expected[c];
         }
         expected[N_CELL * N_CELL] = N_SAMPLE - inside;
         const double x = chi_square_statistic(count, expected, N_CELL * N_CELL + 1, &n_degree);
-        print_message("%s: chi-square %.1f at %.0f degrees of freedom, %.4f inside\n", wave_model_name(o.model), x, n_degree,
-                      inside / N_SAMPLE);
+        print_message("%s: chi-square %.1f at %.0f degrees of freedom, %.4f inside\n", wave_model_name(o.model), x,
+                      n_degree, inside / N_SAMPLE);
         assert_true(inside / N_SAMPLE > 0.9 && inside / N_SAMPLE < 1);
         assert_true(chi_square_tail(x, n_degree) > 1e-4);
         wave_glint_free(g);
@@ -222,8 +225,10 @@ static void test_samples_follow_their_density(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_a_lossless_surface_keeps_its_light), cmocka_unit_test(test_nothing_comes_from_below),
-        cmocka_unit_test(test_three_models_are_reciprocal),        cmocka_unit_test(test_samples_follow_their_density),
+        cmocka_unit_test(test_a_lossless_surface_keeps_its_light),
+        cmocka_unit_test(test_nothing_comes_from_below),
+        cmocka_unit_test(test_three_models_are_reciprocal),
+        cmocka_unit_test(test_samples_follow_their_density),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

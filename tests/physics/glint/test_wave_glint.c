@@ -95,7 +95,8 @@ static struct comparison lobe(const struct wave_glint_option *o, float wavelengt
             if (hypot(i, j) > most) continue;
             unit(q.wo, i * step - 0.05, j * step - 0.02);
             wave_glint_value(g, &q, &wavelength_um, 1, true, &f);
-            const size_t at = (size_t)(j + (int)oracle.n) % oracle.n * oracle.n + (size_t)(i + (int)oracle.n) % oracle.n;
+            const size_t at =
+                (size_t)(j + (int)oracle.n) % oracle.n * oracle.n + (size_t)(i + (int)oracle.n) % oracle.n;
             const double xi_1 = (double)(q.wo[2] / q.wi[2]) / pow((double)wavelength_um, 2);
             compare(&c, (double)f, xi_1 / area_of(o->coherence_um) * power[at]);
         }
@@ -155,7 +156,8 @@ static void random_pair(struct rng *rng, struct wave_glint_query *q)
 {
     const double turn = 2 * M_PI * rng_double(rng), tilt = 0.7 * rng_double(rng);
     unit(q->wi, tilt * cos(turn), tilt * sin(turn));
-    unit(q->wo, -(double)q->wi[0] + 0.15 * (2 * rng_double(rng) - 1), -(double)q->wi[1] + 0.15 * (2 * rng_double(rng) - 1));
+    unit(q->wo, -(double)q->wi[0] + 0.15 * (2 * rng_double(rng) - 1),
+         -(double)q->wi[1] + 0.15 * (2 * rng_double(rng) - 1));
 }
 
 /* All models at oblique directions, each by its own factors from the table of the source. */
@@ -181,11 +183,11 @@ static void test_models_are_their_integrals(void **state)
             const double psi[3] = {(double)(q.wi[0] + q.wo[0]), (double)(q.wi[1] + q.wo[1]),
                                    (double)(q.wi[2] + q.wo[2])};
             const bool is_old = m == WAVE_OHS || m == WAVE_GHS, is_fixed = m == WAVE_OHS || m == WAVE_R_OHS;
-            const double xi_1 = is_old ? (double)(q.wo[2] / q.wi[2])
-                                       : psi[2] * psi[2] / (4 * (double)q.wi[2] * (double)q.wo[2]);
-            const double want = xi_1 / (0.55 * 0.55 * area_of(10)) *
-                                wave_oracle_sum(&oracle, &w, is_fixed ? 2 : psi[2], psi,
-                                                m == WAVE_KIRCHHOFF ? 1 / psi[2] : 0, 0.55);
+            const double xi_1 =
+                is_old ? (double)(q.wo[2] / q.wi[2]) : psi[2] * psi[2] / (4 * (double)q.wi[2] * (double)q.wo[2]);
+            const double want =
+                xi_1 / (0.55 * 0.55 * area_of(10)) *
+                wave_oracle_sum(&oracle, &w, is_fixed ? 2 : psi[2], psi, m == WAVE_KIRCHHOFF ? 1 / psi[2] : 0, 0.55);
             wave_glint_value(g, &q, &um, 1, true, &f);
             compare(&c, (double)f, want);
             worst = fmax(worst, fabs((double)f - want));
@@ -276,7 +278,8 @@ static double expected_lobe(double rms, double length, double sd, double psi, do
     double sum = 0;
     for (int i = 0; i < N; i++) {
         const double t = most * (i + 0.5) / N;
-        sum += exp(-t * t / (4 * sd * sd) - g2 * (1 - exp(-t * t / (length * length)))) * j0(2 * M_PI * psi * t / um) * t;
+        sum +=
+            exp(-t * t / (4 * sd * sd) - g2 * (1 - exp(-t * t / (length * length)))) * j0(2 * M_PI * psi * t / um) * t;
     }
     return 2 * M_PI * sum * most / N;
 }
@@ -314,9 +317,12 @@ static void test_the_mean_over_places_is_known(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_lobes_are_those_of_the_whole_patch), cmocka_unit_test(test_other_surfaces),
-        cmocka_unit_test(test_models_are_their_integrals),         cmocka_unit_test(test_a_mirror_has_the_lobe_of_its_window),
-        cmocka_unit_test(test_pruning_changes_little),             cmocka_unit_test(test_the_mean_over_places_is_known),
+        cmocka_unit_test(test_lobes_are_those_of_the_whole_patch),
+        cmocka_unit_test(test_other_surfaces),
+        cmocka_unit_test(test_models_are_their_integrals),
+        cmocka_unit_test(test_a_mirror_has_the_lobe_of_its_window),
+        cmocka_unit_test(test_pruning_changes_little),
+        cmocka_unit_test(test_the_mean_over_places_is_known),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -88,8 +88,8 @@ static double window_at(const struct wave_oracle_window *w, double x, double y)
     return r2 <= 9 ? exp(-r2 / 2) : 0;
 }
 
-void wave_oracle_lobe(const struct wave_oracle *o, const struct wave_oracle_window *w, double xi_3, double wavelength_um,
-                      double *power)
+void wave_oracle_lobe(const struct wave_oracle *o, const struct wave_oracle_window *w, double xi_3,
+                      double wavelength_um, double *power)
 {
     const size_t n = o->n;
     double complex *r = memory(n * n * sizeof *r);
@@ -105,8 +105,8 @@ void wave_oracle_lobe(const struct wave_oracle *o, const struct wave_oracle_wind
     free(r);
 }
 
-double wave_oracle_sum(const struct wave_oracle *o, const struct wave_oracle_window *w, double xi_3, const double psi[2],
-                       double per_psi_n, double wavelength_um)
+double wave_oracle_sum(const struct wave_oracle *o, const struct wave_oracle_window *w, double xi_3,
+                       const double psi[2], double per_psi_n, double wavelength_um)
 {
     const size_t n = o->n;
     double complex sum = 0;

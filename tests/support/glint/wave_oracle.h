@@ -26,11 +26,11 @@ struct wave_oracle_window {
 
 /* |integral of w exp(-i 2 pi (xi_3 H / lambda + v . s)) ds|^2 for the frequencies v = (i, j) / side, where i and j run
  * from -n / 2 to n / 2 - 1 modulo n. power: n n values. */
-void wave_oracle_lobe(const struct wave_oracle *o, const struct wave_oracle_window *w, double xi_3, double wavelength_um,
-                      double *power);
+void wave_oracle_lobe(const struct wave_oracle *o, const struct wave_oracle_window *w, double xi_3,
+                      double wavelength_um, double *power);
 /* The same for one direction psi, with xi_2 = 1 - (psi . H') per_psi_n. */
-double wave_oracle_sum(const struct wave_oracle *o, const struct wave_oracle_window *w, double xi_3, const double psi[2],
-                       double per_psi_n, double wavelength_um);
+double wave_oracle_sum(const struct wave_oracle *o, const struct wave_oracle_window *w, double xi_3,
+                       const double psi[2], double per_psi_n, double wavelength_um);
 
 /* In place, without a factor: sign -1 forward, 1 back. n: a power of two. */
 void wave_oracle_fourier(double complex *x, size_t n, int sign);

@@ -34,8 +34,11 @@ static void test_metals_have_their_reflectance(void **state)
     const struct {
         enum metal metal;
         double nm, want;
-    } row[] = {{METAL_SILVER, 600, 0.98}, {METAL_ALUMINIUM, 600, 0.91}, {METAL_GOLD, 450, 0.39},
-               {METAL_GOLD, 700, 0.97},   {METAL_COPPER, 650, 0.95}};
+    } row[] = {{METAL_SILVER, 600, 0.98},
+               {METAL_ALUMINIUM, 600, 0.91},
+               {METAL_GOLD, 450, 0.39},
+               {METAL_GOLD, 700, 0.97},
+               {METAL_COPPER, 650, 0.95}};
     for (size_t i = 0; i < sizeof row / sizeof *row; i++) {
         double a[2];
         metal_index(row[i].metal, row[i].nm, a);
