@@ -51,7 +51,7 @@ static bool sample(const struct wave_glint *g, struct wave_glint_query *q, struc
     return wave_glint_sample(g, q->center_um, q->wi, u, q->wo);
 }
 
-/* Energy by stationary phase: light goes where the slopes reflect it, with the weight that xi_1 and xi_3 give the model.
+/* Energy by stationary phase: light goes where the slopes reflect it, with the weight of xi_1 and xi_3 of the model.
  * f_r = xi_1 lambda^2 |xi_2|^2 p(H') / xi_3^2 at psi = -xi_3 H', and the density of directions is that of slopes times
  * d slope / d wo. */
 static double stationary_energy(const struct wave_glint_option *o, const float wi[3])

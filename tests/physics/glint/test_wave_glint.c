@@ -269,7 +269,7 @@ static void test_pruning_changes_little(void **state)
 }
 
 /* Mean over places of a Gaussian surface (Beckmann and Spizzichino 1963): with g = 2 pi xi_3 rms / lambda
- *     E |..|^2 / A_c = 2 pi integral of exp(-t^2 / (4 sd^2)) exp(-g^2 (1 - exp(-t^2 / L^2))) J0(2 pi |psi| t / lambda) t dt
+ * E |..|^2 / A_c = 2 pi integral of exp(-t^2 / (4 sd^2)) exp(-g^2 (1 - exp(-t^2 / L^2))) J0(2 pi |psi| t / lambda) t dt
  */
 static double expected_lobe(double rms, double length, double sd, double psi, double um)
 {
