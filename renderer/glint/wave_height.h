@@ -46,8 +46,8 @@ void wave_height_release(struct wave_height *h);
  * lambda. Neighbouring kernels are not in phase, and their sum is the field over the product of (1 + i x_j)^(1/2). Each
  * kernel is therefore multiplied by this product. To the second order in x its argument is a change of height,
  * sigma^2 (kappa_1 + kappa_2) / 2, and the logarithm of its size is 2 pi^2 sigma^2 / lambda^2 times xi_3^2 gain,
- * gain = sigma^2 (kappa_1^2 + kappa_2^2) / 2, so both serve every wavelength. Beyond that order both are exact at 0.5 um
- * for xi_3 = 2. Changes the heights and fills in gain. STATUS_NO_MEMORY. */
+ * gain = sigma^2 (kappa_1^2 + kappa_2^2) / 2, so both serve every wavelength. Beyond that order both are exact at
+ * 0.5 um for xi_3 = 2. Changes the heights and fills in gain. STATUS_NO_MEMORY. */
 status wave_height_straighten(struct wave_height *h, double sigma_um, struct error *err);
 /* Root mean square of x_j for 0.5 um and xi_3 = 2. */
 double wave_height_bend(const struct wave_height *h, double sigma_um);

@@ -106,8 +106,8 @@ static struct comparison lobe(const struct wave_glint_option *o, float wavelengt
     return c;
 }
 
-/* The correction of kernels for curvature leaves terms of the third order in x = 2 pi xi_3 sigma^2 kappa / lambda, which
- * is 0.12 for the usual bumps at 0.5 um: 0.002 of the field. As published, without it, the second order is left:
+/* The correction of kernels for curvature leaves terms of the third order in x = 2 pi xi_3 sigma^2 kappa / lambda. x is
+ * 0.12 for the usual bumps at 0.5 um: 0.002 of the field. As published, without it, the second order is left:
  * x^2 / 2 of the intensity for each axis, 1.5 %, and the correlation is lower. */
 static void test_lobes_are_those_of_the_whole_patch(void **state)
 {
