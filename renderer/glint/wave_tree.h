@@ -1,5 +1,5 @@
-/* Gabor kernels of a height field (wave_height.h), one for each texel or for each second one and so on, with a hierarchy
- * over their places and directions from which the kernels of a query are gathered.
+/* Gabor kernels of a height field (wave_height.h), one for each texel or for each second one and so on, with a
+ * hierarchy over their places and directions from which the kernels of a query are gathered.
  *
  * Kernel k has its middle at m_k and the standard deviation sigma = l / 2 of the distance l. Its Fourier transform is a
  * Gaussian about the direction psi = -xi_3 H'_k with the standard deviation lambda / (2 pi sigma) (equations 3.27 to
