@@ -1,5 +1,5 @@
 /* Checks of a described cloth that need no geometry: the draft, the orders of the kinds, and the ranges of numbers. */
-#include "base/catalogue/cloth_description.h"
+#include "base/catalogue/cloth_films.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -123,11 +123,12 @@ static status check_kinds(const struct cloth_description *d, struct error *err)
         size_t most = d->structure == CLOTH_FELT ? CLOTH_MAX_FELT_FIBER : CLOTH_MAX_FIBER;
         char field[48];
         snprintf(field, sizeof field, "yarns[%zu].fibers", k);
-        if (kind->n_fiber < 1 || kind->n_fiber > most)
+        if (kind->n_fiber < (kind->film.width_um > 0.0 ? 0 : 1) || kind->n_fiber > most)
             return error_set_field(err, STATUS_INVALID, field, "'%s' is %zu, but must be between 1 and %zu", field,
                                    kind->n_fiber, most);
         snprintf(field, sizeof field, "yarns[%zu].plies", k);
-        if (kind->n_ply < 1 || kind->n_ply > CLOTH_MAX_PLY || kind->n_ply > kind->n_fiber)
+        if (kind->n_ply < 1 || kind->n_ply > CLOTH_MAX_PLY ||
+            (kind->n_ply > kind->n_fiber && (kind->n_fiber > 0 || kind->n_ply > 1)))
             return error_set_field(err, STATUS_INVALID, field,
                                    "'%s' is %zu, but must be between 1 and %d, and at most the number of fibers", field,
                                    kind->n_ply, CLOTH_MAX_PLY);
@@ -261,6 +262,7 @@ status cloth_description_check(struct cloth_description *d, struct error *err)
         if (st == STATUS_OK) st = choose_yarns(d, a, err);
     }
     if (st == STATUS_OK) st = check_places(d, err);
+    if (st == STATUS_OK) st = cloth_films_check(d, err);
     for (size_t i = 0; i < d->n_number && st == STATUS_OK; i++) st = cloth_number_check_one(&d->number[i], err);
     if (st == STATUS_OK) st = check_effect(d, err);
     return st;

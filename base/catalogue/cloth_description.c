@@ -107,6 +107,7 @@ static unsigned has(const struct cloth_description *d, int kind)
         if (!(d->threads_per_cm[CLOTH_WEFT] > 0.0)) mask |= CLOTH_HAS_WEFT_COVER;
     }
     if (kind < 0) return mask;
+    if (d->kind[kind].n_fiber == 0) return 0;
     if (d->structure == CLOTH_VELVET) mask = kind == d->pile_kind ? CLOTH_HAS_PILE : CLOTH_HAS_WEAVE;
     if (d->kind[kind].n_ply > 1) mask |= CLOTH_HAS_PLIES;
     if (d->kind[kind].melange_with >= 0) mask |= CLOTH_HAS_MELANGE;

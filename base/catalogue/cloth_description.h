@@ -11,6 +11,7 @@
 #ifndef SELVEDGE_BASE_CLOTH_DESCRIPTION_H
 #define SELVEDGE_BASE_CLOTH_DESCRIPTION_H
 
+#include "base/catalogue/film_material.h"
 #include "base/catalogue/model_sets.h"
 #include "base/catalogue/param_info.h"
 
@@ -19,6 +20,7 @@
 
 enum {
     CLOTH_MAX_KIND = 4,    /* kinds of yarn */
+    CLOTH_MAX_GROUP = 8,   /* groups of fibers and of films */
     CLOTH_MAX_DRAFT = 32,  /* rows and columns of a draft */
     CLOTH_MAX_ORDER = 64,  /* yarns of one direction after which the order of the kinds repeats */
     CLOTH_MAX_YARN = 128,  /* yarns of one direction in a tile */
@@ -69,12 +71,30 @@ struct cloth_number {
 /* STATUS_INVALID, with err->field naming the number: a value, bounds or a prior that cannot be. */
 status cloth_number_check_one(const struct cloth_number *n, struct error *err);
 
+/* A film of metallised plastic around the fibers of a yarn, or in place of them. */
+struct cloth_film {
+    double width_um;     /* 0: the yarn has no film, and the other members count for nothing */
+    double thickness_um; /* of the film, at its middle: the section is an ellipse */
+    double wraps_per_m;  /* turns about the yarn in a metre of it; negative turns the other way */
+    struct film_material material;
+};
+
+/* Discs of film on the face of a cloth. */
+struct cloth_sequins {
+    double diameter_um; /* 0: the cloth has none */
+    double thickness_um;
+    double spacing_um, row_spacing_um; /* between middles along x, and between rows; a whole number fits in the tile */
+    double tilt_deg, tilt_spread_deg;  /* of all discs alike, and standard deviation of each disc */
+    struct film_material material;
+};
+
 /* Counts and names of one kind of yarn. */
 struct cloth_kind {
-    size_t n_fiber;                  /* fibers in a section; of a tuft of the pile; of a felt: in the tile */
-    size_t n_ply;                    /* 1: single yarn */
-    int melange_with;                /* kind that the share `melange` of its fibers belongs to; -1: none */
+    size_t n_fiber;   /* fibers in a section; of a tuft of the pile; of a felt: in the tile; 0: the yarn is its film */
+    size_t n_ply;     /* 1: single yarn */
+    int melange_with; /* kind that the share `melange` of its fibers belongs to; -1: none */
     char name[MODEL_SET_NAME_BYTES]; /* of its group of fibers; "": none */
+    struct cloth_film film;
 };
 
 struct cloth_description {
@@ -88,7 +108,8 @@ struct cloth_description {
     uint8_t order[2][CLOTH_MAX_ORDER]; /* kinds of the yarns; a knit takes its courses from [CLOTH_WEFT] */
     int pile_kind;                     /* kind of the pile's fibers in a velvet, else -1 */
     size_t n_yarn[2];                  /* yarns in the tile; 0: chosen by cloth_description_check */
-    double threads_per_cm[2];          /* wefts, warps; 0: follows from cover, else it replaces cover */
+    struct cloth_sequins sequins;
+    double threads_per_cm[2]; /* wefts, warps; 0: follows from cover, else it replaces cover */
     uint64_t seed;
     size_t n_number;
     struct cloth_number number[CLOTH_MAX_NUMBER];
@@ -123,11 +144,18 @@ int cloth_number_index(const struct cloth_description *d, const char *name);
 /* Value of the number `name` of kind (-1: of the cloth) in the flat vector; NaN if the cloth has none. */
 double cloth_number_value(const struct cloth_description *d, const double *number, int kind, const char *name);
 
+/* Kinds that have fibers; kinds that are films alone follow them. */
+size_t cloth_n_fiber_kind(const struct cloth_description *d);
+/* Group of fibers of the film of a kind that has one; kind n_kind: of the sequins. */
+size_t cloth_film_group(const struct cloth_description *d, size_t kind);
+/* The materials of all films by their groups. */
+void cloth_film_groups(const struct cloth_description *d, struct film_groups *g);
+
 /* Completes d (n_yarn) and checks it. STATUS_INVALID with the field as in the job document after "cloth.": "draft" (a
  * yarn that never crosses, or yarns that lie above all others), "warp", "weft" (orders that name no kind, or do not
  * repeat within CLOTH_MAX_YARN yarns), "tile_warps", "tile_wefts" (no multiple of the repeat), "yarns" (several kinds
- * in a felt), "yarns[k]" (a kind that no yarn has), "yarns[k].plies", "crimp" and so on for values outside of their
- * ranges and for fitted numbers that change nothing. */
+ * in a felt), "yarns[k]" (a kind that no yarn has), "yarns[k].plies", "yarns[k].film_width_um", "sequin_spacing_um",
+ * "crimp" and so on for values outside of their ranges and for fitted numbers that change nothing. */
 status cloth_description_check(struct cloth_description *d, struct error *err);
 
 /* Sets `to` to the cloth d, which has passed cloth_description_check, with a tile that is `times` as long along both

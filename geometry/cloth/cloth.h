@@ -18,6 +18,8 @@
 #include "base/thread_pool.h"
 #include "geometry/fibers/fiber_set.h"
 
+_Static_assert((int)CLOTH_MAX_GROUP == (int)FIBER_MAX_GROUP, "each film has a group of its own");
+
 struct cloth_report {
     double tile_m[2];
     size_t n_yarn[2];                    /* wefts and warps; courses and wales; 0 of a felt */
@@ -31,18 +33,19 @@ struct cloth_report {
     double volume_fraction; /* volume of the fibers, hairs included, over tile area x thickness without hairs */
     double overlap_mean;    /* depth of interpenetration over the diameter, mean over all points */
     double overlap_max;
-    double strain_p95;              /* of bent fibers: radius over radius of curvature; 95 % of the points stay below */
-    size_t n_fiber[CLOTH_MAX_KIND]; /* fibers of each kind in the tile, as pieces between faces */
-    double length_m[CLOTH_MAX_KIND];
+    double strain_p95; /* of bent fibers: radius over radius of curvature; 95 % of the points stay below */
+    /* Fibers of each kind in the tile, as pieces between faces, and then of each group of films. */
+    size_t n_fiber[FIBER_MAX_GROUP];
+    double length_m[FIBER_MAX_GROUP];
 };
 
 /* Makes the fibers of d, which has passed cloth_description_check, at the values number[d->n_number] in the units of
  * files (NULL: the values of d). f must be initialised; its content is replaced. axis_class: 0 weft, 1 warp, 2 pile;
- * group: kind of yarn. The lowest fiber surface is at z = 0. report: NULL saves the time to measure it. The result does
- * not depend on the number of threads; pool and progress may be NULL. STATUS_INVALID, with err->field naming the
- * number, for values outside of the catalogue's range and for those that contradict each other (a crimp that yarns
- * cannot bend to, threads that have no room); STATUS_TOO_LARGE for more than 20 million vertices; STATUS_NO_MEMORY,
- * STATUS_CANCELLED. */
+ * group: kind of yarn; films follow (cloth_film_group), which are not pushed apart. The lowest fiber surface is at z
+ * = 0. report: NULL saves the time to measure it. The result does not depend on the number of threads; pool and
+ * progress may be NULL. STATUS_INVALID, with err->field naming the number, for values outside of the catalogue's
+ * range and for those that contradict each other (a crimp that yarns cannot bend to, threads that have no room);
+ * STATUS_TOO_LARGE for more than 20 million vertices; STATUS_NO_MEMORY, STATUS_CANCELLED. */
 status cloth_build(const struct cloth_description *d, const double *number, struct thread_pool *pool,
                    const struct progress *progress, struct fiber_set *f, struct cloth_report *report,
                    struct error *err);

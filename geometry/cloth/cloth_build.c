@@ -1,9 +1,10 @@
 #include "geometry/cloth/cloth.h"
 
-#include "geometry/cloth/cloth_work.h"
+#include "geometry/cloth/cloth_film.h"
 #include "geometry/fibers/fiber_view.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* Rounds of pushing fibers apart; pixels along the tile where the cover is measured. */
@@ -48,10 +49,12 @@ static void report_fibers(const struct fiber_set *f, struct cloth_report *r)
     r->volume_fraction = volume / (f->tile_size_m[0] * f->tile_size_m[1] * r->body_thickness_m);
 }
 
-/* Height from the lowest to the highest surface of fibers that are no hairs. */
-static double body_thickness_m(const struct strand_set *s)
+/* Height from the lowest to the highest surface of films and of fibers that are no hairs. */
+static double body_thickness_m(const struct cloth_work *w)
 {
+    const struct strand_set *s = &w->set;
     double low = INFINITY, high = -INFINITY;
+    cloth_film_range(w, &low, &high);
     for (size_t i = 0; i < s->n_strand; i++) {
         const struct strand *t = &s->strand[i];
         for (size_t k = t->first; k < t->first + t->n && !t->hair; k++) {
@@ -60,6 +63,15 @@ static double body_thickness_m(const struct strand_set *s)
         }
     }
     return high - low;
+}
+
+static double strand_highest_m(const struct strand_set *s)
+{
+    double high = -INFINITY;
+    for (size_t i = 0; i < s->n_strand; i++)
+        for (size_t k = 0; k < s->strand[i].n; k++)
+            high = fmax(high, s->p[s->strand[i].first + k][2] + s->strand[i].radius_m);
+    return high;
 }
 
 static double thickest_m(const struct strand_set *s)
@@ -81,11 +93,26 @@ static status report_fill(const struct cloth_work *w, const struct strand_fit *f
     r->overlap_mean = fit->overlap_mean;
     r->overlap_max = fit->overlap_max;
     r->strain_p95 = fit->strain_p95;
-    r->body_thickness_m = body_thickness_m(&w->set);
+    r->body_thickness_m = body_thickness_m(w);
     report_kinds(w, r);
     report_fibers(f, r);
     return fiber_top_view(f, fmax(fmax(r->tile_m[0], r->tile_m[1]) / VIEW_PIXELS, 0.4 * thickest_m(&w->set)), size,
                           NULL, &r->cover, err);
+}
+
+/* The fibers of all strands and films, the lowest of them at 0; sequins lie on top. */
+static status emit(struct cloth_work *w, struct fiber_set *f, struct error *err)
+{
+    const double strands_m = strand_lowest_m(&w->set);
+    double low_m = strands_m, high_m = strand_highest_m(&w->set);
+    cloth_film_range(w, &low_m, &high_m);
+    status st = w->d->sequins.diameter_um > 0.0 ? cloth_film_sequins(w, high_m, err) : STATUS_OK;
+    cloth_film_range(w, &low_m, &high_m);
+    fiber_set_release(f);
+    /* vertices at the nodes alone: they are near enough for the bends that fibers can have */
+    if (st == STATUS_OK && w->set.n_strand > 0)
+        st = strand_emit(&w->set, thickest_m(&w->set), strands_m - low_m, f, err);
+    return st == STATUS_OK ? cloth_film_append(w, -low_m, f, err) : st;
 }
 
 status cloth_build(const struct cloth_description *d, const double *number, struct thread_pool *pool,
@@ -101,11 +128,12 @@ status cloth_build(const struct cloth_description *d, const double *number, stru
     if (st != STATUS_OK) return st;
     kind_shapes(&w);
     st = make(&w, err);
-    if (st == STATUS_OK) st = strand_relax(&w.set, &relax, pool, progress, report != NULL ? &fit : NULL, err);
-    /* vertices at the nodes alone: they are near enough for the bends that fibers can have */
-    if (st == STATUS_OK) st = strand_emit(&w.set, thickest_m(&w.set), 0.0, f, err);
+    if (st == STATUS_OK && w.set.n_strand > 0)
+        st = strand_relax(&w.set, &relax, pool, progress, report != NULL ? &fit : NULL, err);
+    if (st == STATUS_OK) st = emit(&w, f, err);
     if (st == STATUS_OK) st = fiber_set_validate(f, err);
     if (st == STATUS_OK && report != NULL) st = report_fill(&w, &fit, f, report, err);
     strand_set_release(&w.set);
+    free(w.film.node);
     return st;
 }

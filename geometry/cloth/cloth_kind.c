@@ -35,6 +35,19 @@ static void flatten(struct kind_shape *s)
     s->turn_of_twist = 1.0 / sqrt(s->flatness);
 }
 
+/* A film makes its yarn thicker; one without a core is the yarn itself, which turns fill out to a round. */
+static void add_film(const struct cloth_film *film, struct kind_shape *s)
+{
+    for (int a = 0; a < 2; a++) s->core_half_m[a] = s->half_m[a];
+    if (!(film->width_um > 0.0)) return;
+    if (s->n_fiber > 0) {
+        for (int a = 0; a < 2; a++) s->half_m[a] += 1e-6 * film->thickness_um;
+    } else {
+        s->half_m[0] = 0.5e-6 * film->width_um;
+        s->half_m[1] = film->wraps_per_m != 0.0 ? s->half_m[0] : 0.5e-6 * film->thickness_um;
+    }
+}
+
 static void shape(const struct cloth_work *w, const double *number, size_t k, struct kind_shape *s)
 {
     const struct cloth_kind *kind = &w->d->kind[k];
@@ -53,11 +66,12 @@ static void shape(const struct cloth_work *w, const double *number, size_t k, st
                              .hairs_per_m = 1e3 * of_kind(w, number, k, "hairs_per_mm", 0.0),
                              .hair_length_m = 1e-6 * of_kind(w, number, k, "hair_length_um", 0.0),
                              .melange = of_kind(w, number, k, "melange", 0.0)};
-    double per_ply = (double)s->n_fiber / (double)s->n_ply;
+    const double per_ply = (double)s->n_fiber / (double)s->n_ply;
     s->ply_radius_m = s->radius_m * sqrt(per_ply / s->packing);
     if (s->n_ply > 1) s->ply_distance_m = s->ply_radius_m / sin(M_PI / (double)s->n_ply);
     s->round_m = s->ply_radius_m + s->ply_distance_m;
     flatten(s);
+    add_film(&kind->film, s);
 }
 
 void kind_shapes(struct cloth_work *w)

@@ -18,7 +18,15 @@ struct kind_shape {
     double half_m[2];      /* of the flattened section: width, height */
     double ply_radius_m;   /* of the section of a ply; round_m of a single yarn */
     double ply_distance_m; /* between the centres of ply and yarn; 0 of a single yarn */
+    double core_half_m[2]; /* half_m without the film around the yarn */
     double turn_of_twist;  /* turns of the flattened section for each turn of the round one */
+};
+
+/* Films while they are made (cloth_film.h). */
+struct film_node;
+struct film_nodes {
+    size_t n, capacity;
+    struct film_node *node;
 };
 
 struct cloth_work {
@@ -30,6 +38,7 @@ struct cloth_work {
     double nominal_tile_m[2];
     double spacing_m[2]; /* mean, along x (warps) and y (wefts) */
     struct strand_set set;
+    struct film_nodes film;
 };
 
 /* Value of a number of the cloth; NaN if it has none. */

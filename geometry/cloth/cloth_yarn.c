@@ -2,7 +2,7 @@
  * hairs. */
 #include "base/angle.h"
 #include "base/rng.h"
-#include "geometry/cloth/cloth_work.h"
+#include "geometry/cloth/cloth_film.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -244,7 +244,8 @@ status yarn_fill(struct cloth_work *w, size_t kind, const struct yarn *path, dou
         double spread = START_STEP * (double)i, at = start + seam * (spread - floor(spread));
         st = add_staple(&y, i, at - floor(at), err);
     }
-    if (st == STATUS_OK) st = add_hairs(&y, err);
+    if (st == STATUS_OK && y.shape->n_fiber > 0) st = add_hairs(&y, err);
+    if (st == STATUS_OK && w->d->kind[kind].film.width_um > 0.0) st = cloth_film_wrap(w, kind, path, nominal_m, err);
     free(y.length_m);
     return st;
 }

@@ -54,7 +54,8 @@ enum cloth_stream {
     STREAM_SPREAD,
     STREAM_SECTION,
     STREAM_WHITE,
-    STREAM_FLAT
+    STREAM_FLAT,
+    STREAM_FILM
 };
 
 void strand_set_release(struct strand_set *s);
@@ -96,6 +97,8 @@ struct strand_relax_option {
 status strand_relax(struct strand_set *s, const struct strand_relax_option *o, struct thread_pool *pool,
                     const struct progress *progress, struct strand_fit *fit, struct error *err);
 
+/* z of the lowest surface, round sections assumed; INFINITY without strands. */
+double strand_lowest_m(const struct strand_set *s);
 /* Cuts strands, subdivides them to the given spacing (Catmull-Rom through the nodes), and moves them to z_min =
  * margin. */
 status strand_emit(const struct strand_set *s, double spacing_m, double margin_m, struct fiber_set *f,

@@ -201,13 +201,19 @@ static void recentre(struct fiber_set *f)
         }
 }
 
-status strand_emit(const struct strand_set *s, double spacing_m, double margin_m, struct fiber_set *f,
-                   struct error *err)
+double strand_lowest_m(const struct strand_set *s)
 {
     double low = INFINITY;
     for (size_t i = 0; i < s->n_strand; i++)
         for (size_t k = 0; k < s->strand[i].n; k++)
             low = fmin(low, s->p[s->strand[i].first + k][2] - s->strand[i].radius_m);
+    return low;
+}
+
+status strand_emit(const struct strand_set *s, double spacing_m, double margin_m, struct fiber_set *f,
+                   struct error *err)
+{
+    const double low = strand_lowest_m(s);
     struct emitter count = {.tile_m = {s->tile_m[0], s->tile_m[1]}}, emit = count;
     emit_all(&count, s, spacing_m);
     status st = fiber_set_reserve(f, count.n_fiber, count.n_vertex + 16, err);

@@ -12,6 +12,9 @@ static status check(const struct radiance_input *in, struct error *err)
     if (o->deep && (o->n_traced == 0 || o->tables->deep.n_traced != o->n_traced))
         return error_set(err, STATUS_INVALID, "cannot trace %u hits: the table of deep light is for %u", o->n_traced,
                          o->tables->deep.n_traced);
+    if (scene_has_films(in->scene.fibers) && !o->deep)
+        return error_set(err, STATUS_UNSUPPORTED,
+                         "cannot render films by tables of cells: only with those of deep light");
     if (in->n_hit > 0 && !o->deep)
         return error_set(err, STATUS_INVALID, "cannot end paths at a hit by tables: only with those of deep light");
     scene_tile_mm(in->scene.fibers, tile_mm);

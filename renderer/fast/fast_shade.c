@@ -35,7 +35,7 @@ static void describe(const struct fast_setting *s, const struct scene_ray *ray, 
     scene_place_find(s->path.scene, &h->hit, h->offset_mm, &h->place);
     fiber_frame_from(&h->frame, h->hit.tangent);
     fiber_frame_to_local(&h->frame, h->wo_scene, h->wo);
-    h->i_set = s->path.n_set > 1 ? scene_group_of(s->path.scene, h->hit.i_segment) : 0;
+    h->i_set = scene_set_of(s->path.scene, h->hit.i_segment, s->path.n_set);
     h->state = s->path.state[h->i_set];
 }
 

@@ -50,7 +50,7 @@ static void albedo_of(const struct run *r, const struct scene_hit *hit, const fl
     for (int c = 0; c < 3; c++) albedo[c] = 1;
     if (t == NULL) return;
     struct dual_average a;
-    size_t i_set = t->n_set > 1 ? scene_group_of(r->q->scene, hit->i_segment) : 0;
+    size_t i_set = scene_set_of(r->q->scene, hit->i_segment, t->n_set);
     dual_average_at(t, i_set, fiber_angle(along, sqrtf(1 - along * along)), &a);
     for (int c = 0; c < 3; c++) albedo[c] = a.forward[c] + a.backward[c];
 }

@@ -30,7 +30,7 @@ static void set_point(const struct scene *scene, uint32_t i_segment, int end, si
     for (int a = 0; a < 3; a++)
         p->position_mm[a] = segment.middle_mm[a] + ((float)end - 0.5f) * segment.length_mm * segment.tangent[a];
     p->radius_mm = segment.radius_mm;
-    p->i_set = n_set > 1 ? scene_group_of(scene, i_segment) : 0;
+    p->i_set = (uint32_t)scene_set_of(scene, i_segment, n_set);
 }
 
 static double distance2(const float a[3], const float b[3])

@@ -7,6 +7,8 @@ static status check(const struct radiance_input *in, struct error *err)
     const struct diffusion_option *o = in->diffusion;
     double tile_mm[2];
     scene_tile_mm(in->scene.fibers, tile_mm);
+    if (scene_has_films(in->scene.fibers))
+        return error_set(err, STATUS_UNSUPPORTED, "cannot render films by diffusion: take the method 'fast' or 'path'");
     if (o->tables->n_set != (in->n_set > 1 ? in->n_set : 1) || o->tables->tile_mm[0] != tile_mm[0] ||
         o->tables->tile_mm[1] != tile_mm[1])
         return error_set(err, STATUS_INVALID, "cannot render by diffusion: its tables are of another cloth");

@@ -8,6 +8,9 @@ static status check(const struct radiance_input *in, struct error *err)
     if (!(o->density_forward >= 0 && o->density_forward <= 1 && o->density_backward >= 0 && o->density_backward <= 1))
         return error_set(err, STATUS_INVALID, "cannot render by dual scattering with densities of %g and %g",
                          (double)o->density_forward, (double)o->density_backward);
+    if (scene_has_films(in->scene.fibers))
+        return error_set(err, STATUS_UNSUPPORTED,
+                         "cannot render films by dual scattering: take the method 'fast' or 'path'");
     if (o->tables->n_set != (in->n_set > 1 ? in->n_set : 1))
         return error_set(err, STATUS_INVALID, "cannot render by dual scattering: its averages are of another cloth");
     return STATUS_OK;

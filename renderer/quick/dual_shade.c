@@ -20,7 +20,7 @@ static bool pass_fiber(void *context, uint32_t i_segment, float sin_theta)
     struct count *c = context;
     const struct path_setting *path = &c->s->path;
     struct dual_average a;
-    size_t i_set = path->n_set > 1 ? scene_group_of(path->scene, i_segment) : 0;
+    size_t i_set = scene_set_of(path->scene, i_segment, path->n_set);
     float cos_theta = sqrtf(fmaxf(0, 1 - sin_theta * sin_theta)), most = 0;
     dual_average_at(c->s->option->tables, i_set, fiber_angle(sin_theta, cos_theta), &a);
     for (int k = 0; k < 3; k++) {
@@ -147,7 +147,7 @@ uint32_t dual_shade(const struct dual_setting *s, struct scene_ray *ray, struct 
     memcpy(h.offset_mm, ray->offset_mm, sizeof h.offset_mm);
     fiber_frame_from(&h.frame, h.hit.tangent);
     fiber_frame_to_local(&h.frame, back, h.wo);
-    h.i_set = s->path.n_set > 1 ? scene_group_of(s->path.scene, h.hit.i_segment) : 0;
+    h.i_set = scene_set_of(s->path.scene, h.hit.i_segment, s->path.n_set);
     if (l->has_lamp) add_lamp(s, &h, rng, radiance);
     if (l->has_constant || l->image != NULL) add_environment(s, &h, rng, radiance);
     return 1;

@@ -114,40 +114,54 @@ static float radius_mm(const struct fiber_set *f, size_t i, size_t v, double t)
     return (a + (float)t * (b - a)) * (float)MM_PER_M;
 }
 
-/* Whether the fibers have sections that are flat in the mean over their vertices. */
-static bool has_flat_sections(const struct fiber_set *f)
+static bool is_film(const struct film_groups *films, uint8_t group)
+{
+    return films->n > 0 && group >= films->first_group;
+}
+
+/* Whether the fibers that are no films have sections that are flat in the mean over their vertices. */
+static bool has_flat_sections(const struct fiber_set *f, const struct film_groups *films)
 {
     double sum = 0, n = 0;
-    for (size_t v = 0; v < f->n_vertex && f->shape != NULL; v++) {
-        if (!fiber_shape_has_section(&f->shape[v])) continue;
-        sum += (double)f->shape[v].ratio;
-        n++;
-    }
+    for (size_t i = 0; i < f->n_fiber && f->shape != NULL; i++)
+        for (size_t v = f->first_vertex[i]; v < f->first_vertex[i + 1] && !is_film(films, f->group[i]); v++) {
+            if (!fiber_shape_has_section(&f->shape[v])) continue;
+            sum += (double)f->shape[v].ratio;
+            n++;
+        }
     return sum > FIBER_RATIO_FLAT * n;
 }
 
-/* Lowest and highest z of the surfaces. Elliptical sections count as on a level fiber, which reaches farthest. */
-static void z_range(const struct fiber_set *f, bool sections, double *z_min_m, double *z_max_m)
+/* Height of the surface above the axis at a vertex: of a section as on a level fiber, which reaches farthest. */
+static double reach_m(const struct scene *s, const struct fiber_set *f, size_t i, size_t v)
 {
-    fiber_set_z_range_m(f, z_min_m, z_max_m);
-    if (!sections) return;
-    *z_min_m = INFINITY;
-    *z_max_m = -INFINITY;
-    for (size_t v = 0; v < f->n_vertex; v++) {
-        const struct fiber_shape *y = &f->shape[v];
-        const double ratio = (double)y->ratio, up2 = (double)(y->long_axis[2] * y->long_axis[2]),
-                     reach = (double)y->radius * sqrt(ratio * up2 + (1 - up2) / ratio),
-                     z = (double)f->position_m[3 * v + 2];
-        *z_min_m = fmin(*z_min_m, z - reach);
-        *z_max_m = fmax(*z_max_m, z + reach);
-    }
+    if (!s->shows_sections && !is_film(&s->films, f->group[i])) return (double)fiber_radius_m(f, i, v);
+    const struct fiber_shape *y = &f->shape[v];
+    const double ratio = (double)y->ratio, up2 = (double)(y->long_axis[2] * y->long_axis[2]);
+    return (double)y->radius * sqrt(ratio * up2 + (1 - up2) / ratio);
 }
 
-/* Gives the last vertex the section at vertex v of the set. */
-static void add_section(struct scene *s, const struct fiber_set *f, size_t v)
+/* Lowest and highest z of the surfaces. */
+static void z_range(const struct scene *s, const struct fiber_set *f, double *z_min_m, double *z_max_m)
+{
+    fiber_set_z_range_m(f, z_min_m, z_max_m);
+    if (!s->shows_sections && s->films.n == 0) return;
+    *z_min_m = INFINITY;
+    *z_max_m = -INFINITY;
+    for (size_t i = 0; i < f->n_fiber; i++)
+        for (size_t v = f->first_vertex[i]; v < f->first_vertex[i + 1]; v++) {
+            const double z = (double)f->position_m[3 * v + 2], reach = reach_m(s, f, i, v);
+            *z_min_m = fmin(*z_min_m, z - reach);
+            *z_max_m = fmax(*z_max_m, z + reach);
+        }
+}
+
+/* Gives the last vertex the section at vertex v of fiber i of the set; a disc where the section is not shown. */
+static void add_section(struct scene *s, const struct fiber_set *f, size_t i, size_t v)
 {
     if (s->long_axis != NULL) memcpy(s->long_axis[s->n_vertex - 1], f->shape[v].long_axis, sizeof *s->long_axis);
-    if (s->ratio != NULL) s->ratio[s->n_vertex - 1] = f->shape[v].ratio;
+    if (s->ratio == NULL) return;
+    s->ratio[s->n_vertex - 1] = s->shows_sections || is_film(&s->films, f->group[i]) ? f->shape[v].ratio : 1;
 }
 
 static void add_segments(struct scene *s, size_t first, size_t i_fiber)
@@ -161,14 +175,14 @@ static void add_segments(struct scene *s, size_t first, size_t i_fiber)
 }
 
 /* Vertices in millimetres, z from the top; repeated points are left out, and fibers of one point with them. */
-static status copy_fibers(struct scene *s, const struct fiber_set *f, const struct scene_option *o, struct error *err)
+static status copy_fibers(struct scene *s, const struct fiber_set *f, struct error *err)
 {
     double z_min_m, z_max_m;
     size_t n = 0;
     status st = check_reach(f, err);
     if (st == STATUS_OK) st = count_vertices(f, &n, err);
     if (st != STATUS_OK) return st;
-    z_range(f, o->sections && has_flat_sections(f), &z_min_m, &z_max_m);
+    z_range(s, f, &z_min_m, &z_max_m);
     s->bottom_mm = (float)((z_min_m - z_max_m) * MM_PER_M);
     s->vertex = malloc(n * sizeof *s->vertex);
     s->segment_vertex = malloc(n * sizeof *s->segment_vertex);
@@ -176,17 +190,18 @@ static status copy_fibers(struct scene *s, const struct fiber_set *f, const stru
     s->segment_flag = malloc(n);
     if (s->vertex == NULL || s->segment_vertex == NULL || s->segment_fiber == NULL || s->segment_flag == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot build scene: no memory for %zu vertices", n);
-    if (has_flat_sections(f)) {
+    if (s->has_sections || s->films.n > 0) {
+        const bool shown = s->shows_sections || s->films.n > 0;
         s->long_axis = malloc(n * sizeof *s->long_axis);
-        if (o->sections) s->ratio = malloc(n * sizeof *s->ratio);
-        if (s->long_axis == NULL || (o->sections && s->ratio == NULL))
+        if (shown) s->ratio = malloc(n * sizeof *s->ratio);
+        if (s->long_axis == NULL || (shown && s->ratio == NULL))
             return error_set(err, STATUS_NO_MEMORY, "cannot build scene: no memory for %zu sections", n);
     }
     for (size_t i = 0; i < f->n_fiber; i++) {
         size_t first = s->n_vertex, v = f->first_vertex[i];
         const float *start = f->position_m + 3 * v;
         add_vertex(s, first, vertex_at(start, start, 0, z_max_m, radius_mm(f, i, v, 0)), false);
-        add_section(s, f, v);
+        add_section(s, f, i, v);
         for (; v + 1 < f->first_vertex[i + 1]; v++) {
             const float *p = f->position_m + 3 * v, *q = p + 3;
             size_t pieces = (size_t)n_piece(p, q, thinner_m(f, i, v));
@@ -194,7 +209,7 @@ static status copy_fibers(struct scene *s, const struct fiber_set *f, const stru
                 const double t = (double)k / (double)pieces;
                 const bool is_end = k == pieces && v + 2 == f->first_vertex[i + 1];
                 add_vertex(s, first, vertex_at(p, q, t, z_max_m, radius_mm(f, i, v, t)), is_end);
-                add_section(s, f, t < 0.5 ? v : v + 1);
+                add_section(s, f, i, t < 0.5 ? v : v + 1);
             }
         }
         if (s->n_vertex - first < 2)
@@ -209,8 +224,11 @@ static status copy_fibers(struct scene *s, const struct fiber_set *f, const stru
 
 static status copy_groups(struct scene *s, const struct fiber_set *f, struct error *err)
 {
-    s->n_group = fiber_set_n_group(f);
-    if (s->n_group == 1) return STATUS_OK;
+    const size_t n_group = fiber_set_n_group(f);
+    s->n_group = n_group;
+    if (s->films.n > 0 && s->n_group > s->films.first_group) s->n_group = s->films.first_group;
+    if (s->n_group == 0) s->n_group = 1;
+    if (n_group == 1) return STATUS_OK;
     s->segment_group = malloc(s->n_segment);
     if (s->segment_group == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot build scene: no memory for %zu segments", s->n_segment);
@@ -264,7 +282,10 @@ status scene_new(const struct fiber_set *f, const struct scene_option *o, struct
     if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot build scene: out of memory");
     s->black_sheet = o->black_sheet;
     s->no_avx512 = o->no_avx512;
-    st = copy_fibers(s, f, o, err);
+    if (o->films != NULL && f->shape != NULL) s->films = *o->films;
+    s->has_sections = has_flat_sections(f, &s->films);
+    s->shows_sections = s->has_sections && o->sections;
+    st = copy_fibers(s, f, err);
     if (st == STATUS_OK) st = copy_groups(s, f, err);
     if (st == STATUS_OK) st = choose_block(s, f, err);
     if (st == STATUS_OK) st = scene_build(s, err);
@@ -327,10 +348,7 @@ size_t scene_memory_bytes(const struct scene *s)
 
 size_t scene_n_segment(const struct scene *s) { return s->n_segment; }
 uint32_t scene_fiber_of(const struct scene *s, uint32_t i_segment) { return s->segment_fiber[i_segment]; }
-uint32_t scene_group_of(const struct scene *s, uint32_t i_segment)
-{
-    return s->segment_group == NULL ? 0 : s->segment_group[i_segment];
-}
+uint32_t scene_group_of(const struct scene *s, uint32_t i_segment) { return scene_group_at(s, i_segment); }
 size_t scene_n_group(const struct scene *s) { return s->n_group; }
 void scene_tile_mm(const struct scene *s, double tile_mm[2])
 {

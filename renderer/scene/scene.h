@@ -5,6 +5,7 @@
 #ifndef SELVEDGE_RENDERER_SCENE_H
 #define SELVEDGE_RENDERER_SCENE_H
 
+#include "base/catalogue/film_material.h"
 #include "base/status.h"
 #include "geometry/fibers/fiber_set.h"
 #include "renderer/mesh/mesh.h"
@@ -17,7 +18,10 @@ struct scene;
 struct scene_option {
     bool black_sheet; /* true: light that passes the cloth downwards is absorbed and none comes from below */
     bool sections;    /* true: fibers with measured flat sections have them as surfaces, as ellipses of the same area */
-    bool no_avx512;   /* Embree may use AVX2 at most: what a machine without AVX-512 does */
+    /* The groups of fibers that are films; they have their sections as surfaces whatever `sections` says, and are no
+     * groups of the scattering model. NULL: none. Other fibers are then circular cylinders. */
+    const struct film_groups *films;
+    bool no_avx512; /* Embree may use AVX2 at most: what a machine without AVX-512 does */
 };
 
 /* f must satisfy fiber_set_validate and may be released afterwards. STATUS_NO_MEMORY, STATUS_TOO_LARGE; STATUS_INVALID,
@@ -45,7 +49,7 @@ size_t scene_memory_bytes(const struct scene *scene);
 size_t scene_n_segment(const struct scene *scene);
 /* Edges of the tile that repeats, along x and y. */
 void scene_tile_mm(const struct scene *scene, double tile_mm[2]);
-/* fiber_set_n_group of its fibers. */
+/* fiber_set_n_group of its fibers, films left out; at least 1. */
 size_t scene_n_group(const struct scene *scene);
 
 #endif

@@ -2,6 +2,7 @@
 #ifndef SELVEDGE_RENDERER_SCENE_DATA_H
 #define SELVEDGE_RENDERER_SCENE_DATA_H
 
+#include "base/catalogue/film_material.h"
 #include "base/status.h"
 #include "renderer/scene/scene_ray.h"
 
@@ -37,6 +38,8 @@ struct scene {
     uint8_t *segment_group; /* NULL: all 0 */
     float (*long_axis)[3];  /* of the section at each vertex, a unit vector; NULL: sections are taken to be round */
     float *ratio;           /* of each vertex: long over short axis; NULL: surfaces are round tubes */
+    bool has_sections, shows_sections; /* of fibers that are no films (scene_ray.h) */
+    struct film_groups films;
     struct scene_ellipse *ellipse; /* of each segment, where there are ratios (scene_ellipse.h) */
     struct scene_ends *ends;       /* scene_ends.h */
     struct scene_grid *grid;       /* of round fibers (scene_grid.h) */
@@ -51,6 +54,12 @@ struct scene {
     struct bent_cloth *bent; /* NULL: the cloth is flat. Otherwise device, tile and block are those of the flat cloth */
     atomic_llong device_bytes;
 };
+
+/* scene_group_of, without a call. */
+static inline uint32_t scene_group_at(const struct scene *s, uint32_t i_segment)
+{
+    return s->segment_group == NULL ? 0 : s->segment_group[i_segment];
+}
 
 /* Builds the grid or the trees of a scene whose other members are filled in. STATUS_UNSUPPORTED, STATUS_NO_MEMORY. */
 status scene_build(struct scene *s, struct error *err);

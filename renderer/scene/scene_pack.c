@@ -11,7 +11,8 @@ struct scene_head {
     double tile_mm[2];
     int32_t half_block[2];
     float inset_low_mm[2], inset_high_mm[2], bottom_mm;
-    uint8_t black_sheet, no_avx512, has_group, has_axis, has_ratio;
+    uint8_t black_sheet, no_avx512, has_group, has_axis, has_ratio, has_sections, shows_sections;
+    struct film_groups films;
 };
 
 uint64_t scene_number(const struct scene *s) { return s->number; }
@@ -34,7 +35,10 @@ void scene_pack(const struct scene *s, struct byte_pack *p)
                            .no_avx512 = s->no_avx512,
                            .has_group = s->segment_group != NULL,
                            .has_axis = s->long_axis != NULL,
-                           .has_ratio = s->ratio != NULL};
+                           .has_ratio = s->ratio != NULL,
+                           .has_sections = s->has_sections,
+                           .shows_sections = s->shows_sections,
+                           .films = s->films};
     for (int a = 0; a < 2; a++) {
         h.tile_mm[a] = s->tile_mm[a];
         h.half_block[a] = s->half_block[a];
@@ -68,7 +72,9 @@ static bool in_range(const struct scene *s)
 {
     double largest_mm = 0;
     bool good = s->n_segment > 0 && s->n_group >= 1 && s->n_group <= FIBER_MAX_GROUP &&
-                (s->ratio == NULL || s->long_axis != NULL) && isfinite(s->bottom_mm);
+                (s->ratio == NULL || s->long_axis != NULL) && s->films.n <= FILM_MAX_GROUP &&
+                s->films.first_group <= FIBER_MAX_GROUP && (s->films.n == 0 || s->ratio != NULL) &&
+                (!s->has_sections || s->long_axis != NULL) && isfinite(s->bottom_mm);
     for (size_t i = 0; i < s->n_vertex; i++) largest_mm = fmax(largest_mm, (double)s->vertex[i].radius);
     for (int a = 0; a < 2; a++)
         good = good && s->half_block[a] >= 1 && s->half_block[a] <= SCENE_MAX_HALF_BLOCK && s->tile_mm[a] > 0 &&
@@ -76,7 +82,7 @@ static bool in_range(const struct scene *s)
     for (size_t i = 0; good && i < s->n_vertex; i++) good = vertex_in_range(s, i);
     for (size_t i = 0; good && i < s->n_segment; i++)
         good = s->segment_vertex[i] + (size_t)1 < s->n_vertex &&
-               (s->segment_group == NULL || s->segment_group[i] < s->n_group);
+               (s->segment_group == NULL || s->segment_group[i] < s->n_group || scene_film(s, (uint32_t)i) != NULL);
     return good;
 }
 
@@ -92,6 +98,9 @@ status scene_unpack(struct byte_view *v, struct scene **scene, struct error *err
     s->bottom_mm = h.bottom_mm;
     s->black_sheet = h.black_sheet != 0;
     s->no_avx512 = h.no_avx512 != 0;
+    s->has_sections = h.has_sections != 0;
+    s->shows_sections = h.shows_sections != 0;
+    s->films = h.films;
     for (int a = 0; a < 2; a++) {
         s->tile_mm[a] = h.tile_mm[a];
         s->half_block[a] = h.half_block[a];

@@ -78,7 +78,7 @@ bool scene_short_axis(const struct scene *s, size_t i_segment, const float tange
 
 bool scene_section_normal(const struct scene *s, const struct scene_hit *hit, float normal[3])
 {
-    if (s->long_axis == NULL) return false;
+    if (!s->has_sections && scene_film(s, hit->i_segment) == NULL) return false;
     float axis[3];
     long_axis_of(s, hit->i_segment, axis);
     if (s->bent != NULL) {
@@ -91,8 +91,22 @@ bool scene_section_normal(const struct scene *s, const struct scene_hit *hit, fl
     return across_both(axis, hit->tangent, normal);
 }
 
-bool scene_has_sections(const struct scene *s) { return s->long_axis != NULL; }
-bool scene_shows_sections(const struct scene *s) { return s->ratio != NULL; }
+bool scene_has_sections(const struct scene *s) { return s->has_sections; }
+bool scene_shows_sections(const struct scene *s) { return s->shows_sections; }
+
+bool scene_has_films(const struct scene *s) { return s->films.n > 0; }
+
+const struct film_material *scene_film(const struct scene *s, uint32_t i_segment)
+{
+    return s->films.n > 0 ? film_of_group(&s->films, scene_group_at(s, i_segment)) : NULL;
+}
+
+size_t scene_set_of(const struct scene *s, uint32_t i_segment, size_t n_set)
+{
+    return n_set > 1 && scene_film(s, i_segment) == NULL ? scene_group_at(s, i_segment) : 0;
+}
+
+const struct film_groups *scene_films(const struct scene *s) { return &s->films; }
 
 static void scaled_to_one(float v[3])
 {

@@ -10,6 +10,7 @@
 #define SELVEDGE_RENDERER_SCENE_RAY_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 struct scene;
@@ -62,8 +63,17 @@ bool scene_ray_enter(const struct scene *scene, const double origin_mm[3], const
 
 /* Index in the fiber set of a hit segment's fiber. */
 uint32_t scene_fiber_of(const struct scene *scene, uint32_t i_segment);
-/* Material group of that fiber. */
+/* Material group of that fiber, below scene_n_group unless it is a film. */
 uint32_t scene_group_of(const struct scene *scene, uint32_t i_segment);
+
+/* Whether the cloth has films; and the material of a segment that is one. NULL: it is a fiber. The pointer holds as
+ * long as the scene. */
+bool scene_has_films(const struct scene *scene);
+const struct film_groups *scene_films(const struct scene *scene);
+const struct film_material *scene_film(const struct scene *scene, uint32_t i_segment);
+
+/* The parameter set of a segment: its group if there is one for each, else the first; the first also of a film. */
+size_t scene_set_of(const struct scene *scene, uint32_t i_segment, size_t n_set);
 
 bool scene_has_black_sheet(const struct scene *scene);
 /* Whether the black sheet hides what lies in a direction from anywhere in the cloth. Of a bent cloth the direction does
@@ -73,10 +83,11 @@ bool scene_sheet_hides(const struct scene *scene, const float direction[3]);
 bool scene_sheet_met(const struct scene *scene, const struct scene_ray *ray);
 /* The unit normal of a bent cloth where a fiber was hit. False: the cloth is flat, and its normal is z. */
 bool scene_bent_normal(const struct scene *scene, const struct scene_hit *hit, float normal[3]);
-/* The direction of the short axis of the fiber's section where it was hit, unit and across the fiber. False: the
- * sections of the cloth were not measured, or are round (mean ratio of axes up to FIBER_RATIO_FLAT). */
+/* The direction of the short axis of the fiber's section where it was hit, unit and across the fiber. False: the fiber
+ * is no film, and the sections of the cloth were not measured, or are round (mean ratio of axes up to
+ * FIBER_RATIO_FLAT). */
 bool scene_section_normal(const struct scene *scene, const struct scene_hit *hit, float normal[3]);
-/* Whether that direction is known: sections were measured and are not round. */
+/* Whether that direction is known of fibers that are no films: sections were measured and are not round. */
 bool scene_has_sections(const struct scene *scene);
 /* Whether surfaces are elliptical cylinders with these sections (scene_option.sections), and not round tubes. */
 bool scene_shows_sections(const struct scene *scene);

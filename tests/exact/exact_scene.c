@@ -288,6 +288,22 @@ bool scene_section_normal(const struct scene *s, const struct scene_hit *hit, fl
     (void)s, (void)hit, (void)normal;
     return false;
 }
+bool scene_has_films(const struct scene *s)
+{
+    (void)s;
+    return false;
+}
+const struct film_groups *scene_films(const struct scene *s)
+{
+    static const struct film_groups none;
+    (void)s;
+    return &none;
+}
+const struct film_material *scene_film(const struct scene *s, uint32_t i_segment)
+{
+    (void)s, (void)i_segment;
+    return NULL;
+}
 bool scene_shows_sections(const struct scene *s)
 {
     (void)s;
@@ -295,6 +311,10 @@ bool scene_shows_sections(const struct scene *s)
 }
 uint32_t scene_fiber_of(const struct scene *s, uint32_t i_segment) { return s->cloth.fiber[i_segment]; }
 uint32_t scene_group_of(const struct scene *s, uint32_t i_segment) { return s->group[s->cloth.fiber[i_segment]]; }
+size_t scene_set_of(const struct scene *s, uint32_t i_segment, size_t n_set)
+{
+    return n_set > 1 ? scene_group_of(s, i_segment) : 0;
+}
 size_t scene_n_group(const struct scene *s) { return s->n_group; }
 void scene_tile_mm(const struct scene *s, double tile_mm[2]) { memcpy(tile_mm, s->tile_mm, sizeof s->tile_mm); }
 double scene_thickness_mm(const struct scene *s) { return -s->bottom_mm; }

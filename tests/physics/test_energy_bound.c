@@ -74,11 +74,10 @@ struct balance {
 
 static struct balance stated_balance(const struct scattering_model *m)
 {
-    static const struct balance stated[] = {{"two_lobe.v1", {2e-3, 0.28}, {2e-3, 0.01}},
-                                            {"two_lobe_diffuse.v1", {2e-3, 0.28}, {2e-3, 0.01}},
-                                            {"kajiya_kay.v1", {0.1, 0.1}, {2e-3, 2e-3}},
-                                            {"marschner.v1", {0.21, 0.21}, {2e-3, 2e-3}},
-                                            {"hair_mixture.v1", {0.03, 2e-3}, {0.7, 2e-3}}};
+    static const struct balance stated[] = {
+        {"two_lobe.v1", {2e-3, 0.28}, {2e-3, 0.01}}, {"two_lobe_diffuse.v1", {2e-3, 0.28}, {2e-3, 0.01}},
+        {"kajiya_kay.v1", {0.1, 0.1}, {2e-3, 2e-3}}, {"marschner.v1", {0.21, 0.21}, {2e-3, 2e-3}},
+        {"film.v1", {0.15, 0.15}, {2e-3, 2e-3}},     {"hair_mixture.v1", {0.03, 2e-3}, {0.7, 2e-3}}};
     for (size_t k = 0; k < sizeof stated / sizeof stated[0]; k++)
         if (strcmp(stated[k].id, m->id) == 0) return stated[k];
     return (struct balance){m->id, {2e-3, 2e-3}, {2e-3, 2e-3}};

@@ -28,6 +28,12 @@ static void name_section(const char *section, struct error *err)
 
 void job_cloth_name_field(struct error *err) { name_section("cloth", err); }
 
+void job_cloth_films(const struct job_cloth *cloth, struct film_groups *films)
+{
+    memset(films, 0, sizeof *films);
+    if (cloth->description != NULL) cloth_film_groups(cloth->description, films);
+}
+
 static status read_draft(const json_t *list, struct cloth_description *d, struct error *err)
 {
     const char *row[CLOTH_MAX_DRAFT];
@@ -165,6 +171,33 @@ static status read_numbers(const json_t *section, struct cloth_description *d, s
     return st;
 }
 
+static void take_material(const struct job_film *from, struct film_material *m)
+{
+    film_metal_color(from->metal, m->color);
+    for (int c = 0; c < 3 && !isnan(from->color[0]); c++) m->color[c] = (float)from->color[c];
+    m->roughness = (float)from->roughness;
+}
+
+static void take_film(const struct job_film *from, struct cloth_kind *kind)
+{
+    if (isnan(from->width_um)) return;
+    kind->film = (struct cloth_film){
+        .width_um = from->width_um, .thickness_um = from->thickness_um, .wraps_per_m = from->wraps_per_m};
+    take_material(from, &kind->film.material);
+}
+
+static void take_sequins(const struct job_film *from, struct cloth_sequins *q)
+{
+    if (isnan(from->width_um)) return;
+    *q = (struct cloth_sequins){.diameter_um = from->width_um,
+                                .thickness_um = from->thickness_um,
+                                .spacing_um = from->spacing_um,
+                                .row_spacing_um = from->row_spacing_um,
+                                .tilt_deg = from->tilt_deg,
+                                .tilt_spread_deg = from->tilt_spread_deg};
+    take_material(from, &q->material);
+}
+
 static void take_kinds(const struct job_cloth *cloth, const json_t *section, struct cloth_description *d)
 {
     const json_t *yarns = json_object_get(section, "yarns");
@@ -175,7 +208,8 @@ static void take_kinds(const struct job_cloth *cloth, const json_t *section, str
     for (size_t k = 0; k < d->n_kind; k++) {
         const struct job_cloth_yarn *y = &cloth->yarn[k];
         d->kind[k] = (int)k == d->pile_kind ? pile : ground;
-        if (y->n_fiber > 0) d->kind[k].n_fiber = y->n_fiber;
+        if (y->n_fiber > 0 || !isnan(y->film.width_um)) d->kind[k].n_fiber = y->n_fiber;
+        take_film(&y->film, &d->kind[k]);
         d->kind[k].n_ply = y->n_ply;
         if (json_object_get(json_array_get(yarns, k), "melange_with") != NULL)
             d->kind[k].melange_with = (int)y->melange_with;
@@ -203,6 +237,7 @@ static status read_cloth(const json_t *section, struct job_cloth *cloth, struct 
     if (st == STATUS_OK) st = check_yarn_keys(section, d, err);
     if (st != STATUS_OK) return st;
     take_kinds(cloth, section, d);
+    take_sequins(&cloth->sequins, &d->sequins);
     if (d->pile_kind == 0)
         return error_set_field(err, STATUS_INVALID, "cloth.yarns",
                                "a velvet has at least two kinds of yarn: the ground, and last the pile");
@@ -220,9 +255,10 @@ static status read_cloth(const json_t *section, struct job_cloth *cloth, struct 
     return st == STATUS_OK ? cloth_description_check(d, err) : st;
 }
 
-/* Reads the names of the kinds of yarn, which are the groups of fibers: all have one, or none. */
+/* Reads the names of the kinds of yarn, which are the groups of fibers: all that have fibers have one, or none. */
 static status read_names(struct job_cloth *cloth, struct error *err)
 {
+    const size_t n_fiber_kind = cloth->n_yarn > 0 ? cloth_n_fiber_kind(cloth->description) : 0;
     size_t n_named = 0;
     status s = STATUS_OK;
     for (size_t k = 0; k < cloth->n_yarn; k++) n_named += cloth->yarn[k].name[0] != '\0';
@@ -230,9 +266,11 @@ static status read_names(struct job_cloth *cloth, struct error *err)
         memcpy(cloth->description->kind[k].name, cloth->yarn[k].name, sizeof cloth->description->kind[k].name);
         char path[JSON_PATH_BYTES];
         snprintf(path, sizeof path, "cloth.yarns[%zu].name", k);
-        s = n_named == cloth->n_yarn ? job_add_group(cloth, cloth->yarn[k].name, path, err)
-                                     : error_set_field(err, STATUS_INVALID, path,
-                                                       "'%s': either all kinds of yarn have a name, or none", path);
+        if (k >= n_fiber_kind && cloth->yarn[k].name[0] == '\0') continue;
+        s = n_named == n_fiber_kind
+                ? job_add_group(cloth, cloth->yarn[k].name, path, err)
+                : error_set_field(err, STATUS_INVALID, path,
+                                  "'%s': either all kinds of yarn that have fibers have a name, or none", path);
     }
     return s;
 }

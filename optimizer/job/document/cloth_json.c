@@ -1,5 +1,8 @@
 #include "optimizer/job/document/cloth_json.h"
 
+#include <math.h>
+#include <stdio.h>
+
 json_t *cloth_draft_json(const struct cloth_description *d)
 {
     json_t *list = json_array();
@@ -27,11 +30,45 @@ static void put_numbers(json_t *section, const struct cloth_description *d, cons
                                 json_real(number != NULL ? number[i] : d->number[i].value));
 }
 
+static void put_material(json_t *to, const char *prefix, const struct film_material *m)
+{
+    char key[32];
+    json_t *color = json_array();
+    for (int c = 0; c < 3; c++) json_array_append_new(color, json_real(round(1e4 * (double)m->color[c]) / 1e4));
+    snprintf(key, sizeof key, "%scolor", prefix);
+    json_object_set_new(to, key, color);
+    snprintf(key, sizeof key, "%sroughness", prefix);
+    json_object_set_new(to, key, json_real(round(1e4 * (double)m->roughness) / 1e4));
+}
+
+static void put_film(json_t *yarn, const struct cloth_film *f)
+{
+    if (!(f->width_um > 0.0)) return;
+    json_object_set_new(yarn, "film_width_um", json_real(f->width_um));
+    json_object_set_new(yarn, "film_thickness_um", json_real(f->thickness_um));
+    json_object_set_new(yarn, "film_wraps_per_m", json_real(f->wraps_per_m));
+    put_material(yarn, "film_", &f->material);
+}
+
+static void put_sequins(json_t *section, const struct cloth_sequins *q)
+{
+    if (!(q->diameter_um > 0.0)) return;
+    json_object_set_new(section, "sequin_diameter_um", json_real(q->diameter_um));
+    json_object_set_new(section, "sequin_thickness_um", json_real(q->thickness_um));
+    json_object_set_new(section, "sequin_spacing_um", json_real(q->spacing_um));
+    json_object_set_new(section, "sequin_row_spacing_um", json_real(q->row_spacing_um));
+    json_object_set_new(section, "sequin_tilt_deg", json_real(q->tilt_deg));
+    json_object_set_new(section, "sequin_tilt_spread_deg", json_real(q->tilt_spread_deg));
+    put_material(section, "sequin_", &q->material);
+}
+
 static json_t *yarn_json(const struct cloth_description *d, const double *number, size_t k)
 {
     json_t *yarn =
         json_pack("{s:I, s:I}", "fibers", (json_int_t)d->kind[k].n_fiber, "plies", (json_int_t)d->kind[k].n_ply);
     if (d->kind[k].name[0] != '\0') json_object_set_new(yarn, "name", json_string(d->kind[k].name));
+    if (d->kind[k].n_fiber == 0) json_object_del(yarn, "fibers");
+    put_film(yarn, &d->kind[k].film);
     if (d->kind[k].melange_with >= 0) json_object_set_new(yarn, "melange_with", json_integer(d->kind[k].melange_with));
     put_numbers(yarn, d, number, (int)k);
     return yarn;
@@ -56,6 +93,7 @@ json_t *cloth_section_json(const struct cloth_description *d, const double *numb
         json_object_set_new(section, "weft_per_cm", json_real(d->threads_per_cm[CLOTH_WEFT]));
     json_object_set_new(section, "seed", json_integer((json_int_t)d->seed));
     put_numbers(section, d, number, -1);
+    put_sequins(section, &d->sequins);
     for (size_t k = 0; k < d->n_kind; k++) json_array_append_new(yarns, yarn_json(d, number, k));
     json_object_set_new(section, "yarns", yarns);
     return section;

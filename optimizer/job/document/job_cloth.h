@@ -4,6 +4,7 @@
 #define SELVEDGE_OPTIMIZER_JOB_CLOTH_H
 
 #include "base/catalogue/correction_numbers.h"
+#include "base/catalogue/film_material.h"
 #include "base/catalogue/model_sets.h"
 #include "base/status.h"
 #include "optimizer/job/document/job_limits.h"
@@ -11,10 +12,18 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+/* A film of a yarn, or sequins, as given; NaN and "": not given. */
+struct job_film {
+    double width_um, thickness_um, wraps_per_m, roughness, color[3];
+    double spacing_um, row_spacing_um, tilt_deg, tilt_spread_deg; /* of sequins */
+    char metal[16];
+};
+
 /* Counts and names that the document gives of a kind of yarn; 0 fibers: not given. */
 struct job_cloth_yarn {
     size_t n_fiber, n_ply, melange_with;
     char name[MODEL_SET_NAME_BYTES]; /* "": none */
+    struct job_film film;
 };
 
 struct job_cloth {
@@ -39,6 +48,7 @@ struct job_cloth {
     uint64_t seed;
     size_t n_yarn;
     struct job_cloth_yarn *yarn;
+    struct job_film sequins;
     struct cloth_description *description;
     bool has_correction;
     struct cloth_number correction[CORRECTION_N]; /* of scanned or given fibers; set with has_correction */
@@ -46,6 +56,9 @@ struct job_cloth {
     size_t n_group;
     char group[MODEL_MAX_SET][MODEL_SET_NAME_BYTES];
 };
+
+/* The films of a described cloth, for its scene; none of other cloths. */
+void job_cloth_films(const struct job_cloth *cloth, struct film_groups *films);
 
 /* Puts the section "cloth" before the field that a check or the builder of a described cloth named, in the error's text
  * too. */

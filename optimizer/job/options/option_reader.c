@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_KEY = 40, MAX_CHOICE = 40 };
+enum { MAX_KEY = 64, MAX_CHOICE = 40 };
 
 /* A document while it is read. */
 struct reading {

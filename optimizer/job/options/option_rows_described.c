@@ -25,6 +25,35 @@
     NUMBER_ROW("correction.", name, unit, lower, upper, standard, meaning)
 
 static const char *weave_name(size_t i) { return cloth_weave_names[i]; }
+static const char *metal_name(size_t i) { return film_metal_names[i]; }
+
+/* Rows of a film or of sequins, whose paths begin with `where`; `numbers` and `texts` say where values go. */
+#define FILM_NUMBER(where, into, name, from, to, units, value, text)                                                   \
+    {                                                                                                                  \
+        .path = where #name, .kind = OPTION_NUMBER, into(name), RANGE(from, to), .unit = units, .standard = value,     \
+        .meaning = text                                                                                                \
+    }
+#define FILM_METAL(where, numbers, many, texts)                                                                        \
+    {.path = where "metal",                                                                                            \
+     .kind = OPTION_WORD,                                                                                              \
+     texts(metal),                                                                                                     \
+     .choice_at = metal_name,                                                                                          \
+     .standard = "\"silver\"",                                                                                         \
+     .meaning = "Metal, which gives the color."},                                                                      \
+        {.path = where "color",                                                                                        \
+         .kind = OPTION_NUMBERS,                                                                                       \
+         many(color),                                                                                                  \
+         RANGE(0.001, 1),                                                                                              \
+         .left_out = "from the metal",                                                                                 \
+         .allowed = "r, g, b",                                                                                         \
+         .meaning = "Reflectance at normal incidence, of a lacquered film."},                                          \
+        FILM_NUMBER(where, numbers, roughness, 0.02, 1, NULL, "0.2", "Roughness of the metal: alpha of GGX.")
+#define FILM_OF_YARN(member) INTO_OF(struct job_cloth_yarn, film.member)
+#define FILM_TEXT_OF_YARN(member) TEXT_INTO_OF(struct job_cloth_yarn, film.member)
+#define FILM_NUMBERS_OF_YARN(member) NUMBERS_INTO_OF(struct job_cloth_yarn, film.member)
+#define SEQUIN(member) INTO(cloth, sequins.member)
+#define SEQUIN_TEXT(member) TEXT_INTO(cloth, sequins.member)
+#define SEQUIN_NUMBERS(member) NUMBERS_INTO(cloth, sequins.member)
 
 #define ORDER_SCHEMA                                                                                                   \
     "{\"type\": \"array\", \"items\": {\"type\": \"integer\", \"minimum\": 0, \"maximum\": 3}, \"minItems\": 1, "      \
@@ -183,6 +212,33 @@ const struct job_option option_rows_described[] = {
      RANGE(0, 3),
      .left_out = "pure yarn",
      .meaning = "Kind that a share of this yarn's fibers belongs to; the number `melange` is the share."},
+    {.path = "cloth.yarns[].film_width_um",
+     .kind = OPTION_NUMBER,
+     FILM_OF_YARN(width_um),
+     RANGE(10, 5000),
+     .unit = "um",
+     .left_out = "no film",
+     .meaning =
+         "Width of a flat film of metallised plastic around the yarn. Without `fibers` the yarn is the film alone "
+         "(lame); such kinds come last and have no `name`."},
+    FILM_NUMBER("cloth.yarns[].film_", FILM_OF_YARN, thickness_um, 2, 500, "um", "12", "Thickness of the film."),
+    FILM_NUMBER("cloth.yarns[].film_", FILM_OF_YARN, wraps_per_m, -50000, 50000, "1/m", "0",
+                "Turns of the film in a metre, rounded to whole turns in the tile."),
+    FILM_METAL("cloth.yarns[].film_", FILM_OF_YARN, FILM_NUMBERS_OF_YARN, FILM_TEXT_OF_YARN),
+    {.path = "cloth.sequin_diameter_um",
+     .kind = OPTION_NUMBER,
+     SEQUIN(width_um),
+     RANGE(50, 50000),
+     .unit = "um",
+     .left_out = "no sequins",
+     .meaning = "Diameter of sequins: discs of metallised film on the face of the cloth."},
+    FILM_NUMBER("cloth.sequin_", SEQUIN, thickness_um, 5, 2000, "um", "100", "Their thickness."),
+    FILM_NUMBER("cloth.sequin_", SEQUIN, spacing_um, 50, 100000, "um", "3000",
+                "Between middles along the weft, rounded so that the tile has whole sequins."),
+    FILM_NUMBER("cloth.sequin_", SEQUIN, row_spacing_um, 50, 100000, "um", "2000", "Between their rows."),
+    FILM_NUMBER("cloth.sequin_", SEQUIN, tilt_deg, 0, 60, "deg", "12", "Tilt of all, by which they overlap."),
+    FILM_NUMBER("cloth.sequin_", SEQUIN, tilt_spread_deg, 0, 20, "deg", "2", "Standard deviation of single tilts."),
+    FILM_METAL("cloth.sequin_", SEQUIN, SEQUIN_NUMBERS, SEQUIN_TEXT),
 #define CLOTH_NUMBER(name, unit, lower, upper, standard, coordinate, structures, meaning)
 #define YARN_NUMBER(name, unit, lower, upper, standard, coordinate, structures, meaning)                               \
     NUMBER_ROW("cloth.yarns[].", name, unit, lower, upper, standard, meaning)

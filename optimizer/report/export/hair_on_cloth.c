@@ -298,6 +298,8 @@ status hair_on_cloth_run(struct export_scene *e, double from, double to, struct 
         free(f);
         return error_set(err, STATUS_NO_MEMORY, "cannot fit hair on the cloth: out of memory");
     }
+    struct film_groups films;
+    job_cloth_films(e->report->in.job->cloth, &films);
     f->e = e;
     f->budget = budget_of((double)e->model->fit->result.n_path);
     observation_set_init(&f->fitted);
@@ -310,7 +312,8 @@ status hair_on_cloth_run(struct export_scene *e, double from, double to, struct 
             : error_set(err, STATUS_INTERNAL, "there is no model %s", model_id);
     if (s == STATUS_OK && scene_shows_sections(e->report->in.made->scene))
         s = scene_new(&e->report->in.made->fiber,
-                      &(struct scene_option){.black_sheet = e->report->in.job->setup->black_sheet}, &f->round, err);
+                      &(struct scene_option){.black_sheet = e->report->in.job->setup->black_sheet, .films = &films},
+                      &f->round, err);
     for (size_t g = 0; g < n_set && s == STATUS_OK; g++)
         param_of(&e->hair[g].blend, f->mixture.param, f->param + g * N_OF_MIXTURE);
     if (s == STATUS_OK) s = take_rows(f, err);

@@ -1,5 +1,6 @@
 #include "optimizer/report/textures/texture_tile.h"
 
+#include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/report/textures/texture_smooth.h"
 #include "optimizer/stages/validation/pipeline_discrepancy.h"
@@ -147,7 +148,9 @@ static status render_both(const struct export_scene *e, struct texture_tile *t, 
     struct image *out[2] = {&t->reflected, &t->transmitted};
     t->maps.share = calloc(3 * t->maps.width * t->maps.height, sizeof *t->maps.share);
     if (t->maps.share == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot render textures: out of memory");
-    status s = scene_new(&e->report->in.made->fiber, &(struct scene_option){.black_sheet = false}, &scene, err);
+    struct film_groups films;
+    job_cloth_films(e->report->in.job->cloth, &films);
+    status s = scene_new(&e->report->in.made->fiber, &(struct scene_option){.films = &films}, &scene, err);
     for (int k = 0; k < 2 && s == STATUS_OK; k++) {
         const double part[2] = {0.5 * k * TEXTURE_TILE_SHARE, 0.5 * (k + 1) * TEXTURE_TILE_SHARE};
         struct environment *light = NULL;

@@ -231,6 +231,9 @@ static status build_cloth(const struct fibers_input *in, struct fibers_output *o
 static status check_groups(const struct fibers_input *in, struct fibers_output *out, struct error *err)
 {
     size_t n_fiber[FIBER_MAX_GROUP] = {0}, n_group = fiber_set_n_group(&out->fiber);
+    struct film_groups films;
+    job_cloth_films(in->cloth, &films);
+    if (films.n > 0 && n_group > films.first_group) n_group = films.first_group;
     for (size_t i = 0; i < out->fiber.n_fiber; i++) n_fiber[out->fiber.group[i]]++;
     if (in->cloth->n_group == 0) {
         if (n_group > 1 && in->cloth->description == NULL)

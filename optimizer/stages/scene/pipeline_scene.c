@@ -75,16 +75,20 @@ static void release_scenes(struct made_cloth *made)
  * are made for round tubes. */
 static bool sees_sections(const struct appearance *a) { return a->kind == MODEL_SURFACE && a->surface->width != NULL; }
 
-static status make_fiber_scene(const struct job_setup *setup, const struct fiber_set *f, bool sections,
+static status make_fiber_scene(const struct cloth_job *job, const struct fiber_set *f, bool sections,
                                struct scene **scene, struct error *err)
 {
-    return scene_new(f, &(struct scene_option){.black_sheet = setup->black_sheet, .sections = sections}, scene, err);
+    struct film_groups films;
+    job_cloth_films(job->cloth, &films);
+    return scene_new(
+        f, &(struct scene_option){.black_sheet = job->setup->black_sheet, .sections = sections, .films = &films}, scene,
+        err);
 }
 
 status made_cloth_fiber_scene(const struct cloth_job *job, size_t i_model, const struct fiber_set *f,
                               struct scene **scene, struct error *err)
 {
-    return make_fiber_scene(job->setup, f, sees_sections(&job->model[i_model].appearance), scene, err);
+    return make_fiber_scene(job, f, sees_sections(&job->model[i_model].appearance), scene, err);
 }
 
 struct appearance_scene made_cloth_scene(const struct made_cloth *made, const struct model_setup *m)
@@ -103,11 +107,11 @@ status made_cloth_make_surface_scene(const struct cloth_job *job, struct made_cl
         sections |= sees_sections(a);
         tubes |= a->kind == MODEL_SURFACE && !sees_sections(a);
     }
-    status s = make_fiber_scene(job->setup, &made->fiber, sections, &made->scene, err);
+    status s = make_fiber_scene(job, &made->fiber, sections, &made->scene, err);
     if (s != STATUS_OK || !tubes || !scene_shows_sections(made->scene)) return s;
     made->section_scene = made->scene;
     made->scene = NULL;
-    return make_fiber_scene(job->setup, &made->fiber, false, &made->scene, err);
+    return make_fiber_scene(job, &made->fiber, false, &made->scene, err);
 }
 
 status made_cloth_make_scene(const struct cloth_job *job, struct made_cloth *made, struct error *err)

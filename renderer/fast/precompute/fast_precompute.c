@@ -41,6 +41,8 @@ uint64_t fast_tables_checksum(const struct fast_precompute_request *q)
     h = add_bytes(h, r.model->id, strlen(r.model->id));
     h = add_bytes(h, r.param, r.n_set * r.model->n_param * sizeof *r.param);
     h = add_bytes(h, number, sizeof number);
+    const struct film_groups *films = scene_films(r.scene);
+    h = add_bytes(h, films->material, films->n * sizeof *films->material);
     return add_bytes(h, real, sizeof real);
 }
 

@@ -1,4 +1,5 @@
 #include "renderer/transport/surface/parameter_sets.h"
+#include "renderer/scene/scene_ray.h"
 
 #include <string.h>
 
@@ -7,6 +8,7 @@ status parameter_sets_init(struct parameter_sets *s, const struct scene *scene, 
 {
     memset(s, 0, sizeof *s);
     s->model = model;
+    s->films = *scene_films(scene);
     s->n = n_set > 1 ? n_set : 1;
     if (s->n > SCATTERING_MAX_SET || s->n * model->n_param > SCATTERING_MAX_FLAT)
         return error_set_field(err, STATUS_INVALID, "n_set",

@@ -10,7 +10,14 @@ struct parameter_sets {
     const struct scattering_model *model;
     size_t n; /* at least 1 */
     struct scattering_state *state[SCATTERING_MAX_SET];
+    struct film_groups films; /* of the scene, which need no set */
 };
+
+/* The film that a group is; NULL: it is a group of fibers. */
+static inline const struct film_material *parameter_sets_film(const struct parameter_sets *s, size_t i_group)
+{
+    return film_of_group(&s->films, i_group);
+}
 
 /* param: max(n_set, 1) * model->n_param. One set serves all groups of the scene; otherwise every group needs one.
  * STATUS_INVALID for too few sets for the scene's groups or more parameters than SCATTERING_MAX_FLAT, and the errors

@@ -37,7 +37,7 @@ static inline void path_add_light_to_all(struct walk *w, const float value[3], c
 
 static inline void path_leave(struct walk *w, const struct bounce *b, const float direction[3], struct scene_ray *ray)
 {
-    if (PATH_PLAIN)
+    if (PATH_PLAIN || w->film != NULL)
         scene_ray_leave(&b->hit, b->offset_mm, direction, ray);
     else
         fiber_walk_leave(w->s->model, &b->hit, b->offset_mm, direction, w->rng, ray);
@@ -96,6 +96,7 @@ static float path_connect_lamp(struct walk *w, const struct lamp *lamp, float we
     float u[2], of_lamp[2], unused[3];
     if (w->has_strips) {
         lamp_strip_init(strip, lamp, b->position_mm, b->frame.u, b->wo[0], w->s->lobe_rad[w->i_set]);
+        strip->used = strip->used && !path_walk_on_film(w);
         if (strip->used) seen.strip = strip;
     }
     for (int a = 0; a < 2; a++) u[a] = rng_float(w->rng);

@@ -18,7 +18,7 @@ static inline void path_factor_note(struct walk *w, struct bounce *b, const stru
     if (w->first_out->n_bounce > 1) return;
     for (int a = 0; a < 3; a++) w->to_camera[a] = -ray->direction[a];
     w->cos_camera = fiber_frame_dot(w->to_camera, b->normal);
-    if (w->s->speckle.table == NULL) return;
+    if (w->s->speckle.table == NULL || w->film != NULL) return;
     b->has_speckle = true;
     w->i_fiber = scene_fiber_of(w->s->scene, b->hit.i_segment);
     fiber_frame_flat_in(&w->speckle_frame, b->hit.tangent, b->normal); /* turns with the fiber, without a jump */
@@ -37,7 +37,7 @@ static inline void path_factor_apply(const struct walk *w, const struct bounce *
                            w->cos_camera, fiber_frame_dot(direction, w->to_camera), factor);
         for (int c = 0; c < 3; c++) value[c] *= (float)factor[c];
     }
-    if (w->s->speckle.table != NULL && (b != NULL ? b->has_speckle : w->first_out->n_bounce == 1)) {
+    if (w->s->speckle.table != NULL && (b != NULL ? b->has_speckle : w->first_out->n_bounce == 1 && w->film == NULL)) {
         float wi[3], factor[3];
         fiber_frame_to_local(&w->speckle_frame, direction, wi);
         speckle_factor(&w->s->speckle, w->i_fiber, wi, w->speckle_wo, factor);

@@ -9,6 +9,11 @@ struct replay {
 static void eval(const struct replay *r, uint32_t i_group, const float wi[3], const float wo[3], float s_rgb[3])
 {
     const struct scattering_model *m = r->sets->model;
+    const struct film_material *film = parameter_sets_film(r->sets, i_group);
+    if (film != NULL) {
+        path_film_eval(film, wi, wo, s_rgb);
+        return;
+    }
     const struct scattering_state *state = r->sets->state[r->sets->n > 1 ? i_group : 0];
     m->eval(state, wi, wo, s_rgb, NULL);
     if (!r->shows_width) return;

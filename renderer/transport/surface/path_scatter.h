@@ -2,7 +2,10 @@
 #ifndef SELVEDGE_RENDERER_PATH_SCATTER_H
 #define SELVEDGE_RENDERER_PATH_SCATTER_H
 
+#include "renderer/transport/surface/path_film.h"
 #include "renderer/transport/surface/path_walk.h"
+
+#include <string.h>
 
 /* Width that a section shows to the light over that which it shows to wo: D(ph_i) / D(ph_o) of the fabric thesis,
  * equation 2.11. score: NULL, or [3 * n_param], to which the derivatives of its logarithm are added. */
@@ -13,13 +16,16 @@ float path_scatter_widths(const struct scattering_model *m, const struct scatter
 static inline void path_scatter_look(const struct walk *w, struct bounce *b)
 {
     const struct scattering_model *m = w->s->model;
+    if (path_walk_on_film(w)) return;
     if (PATH_PLAIN || m->view_of != NULL) m->view_of(w->state, b->wo, w->throughput, &b->view);
 }
 
 static inline void path_scatter_sample(const struct walk *w, const struct bounce *b, const float u[3], float wi[3])
 {
     const struct scattering_model *m = w->s->model;
-    if (PATH_PLAIN || m->view_of != NULL)
+    if (path_walk_on_film(w))
+        film_facets_sample(w->film, b->wo, u, wi);
+    else if (PATH_PLAIN || m->view_of != NULL)
         m->sample_view(w->state, &b->view, u, wi);
     else
         m->sample(w->state, b->wo, w->throughput, u, wi);
@@ -32,6 +38,10 @@ static inline float path_scatter(const struct walk *w, const struct bounce *b, c
 {
     const struct path_setting *s = w->s;
     const struct scattering_model *m = s->model;
+    if (path_walk_on_film(w)) {
+        if (score != NULL) memset(score, 0, 3 * m->n_param * sizeof *score);
+        return path_film_eval(w->film, wi, b->wo, s_rgb);
+    }
     const float pdf = PATH_PLAIN || m->view_of != NULL ? m->eval_pdf_view(w->state, wi, &b->view, s_rgb, score)
                                                        : m->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, score);
     if (PATH_PLAIN || !s->shows_width) return pdf;
@@ -47,6 +57,10 @@ static inline void path_scatter_score(struct walk *w, const struct bounce *b, co
     const struct path_setting *s = w->s;
     float s_rgb[3];
     if (!s->want_jacobian) return;
+    if (path_walk_on_film(w)) {
+        memset(w->score, 0, 3 * s->model->n_param * sizeof *w->score);
+        return;
+    }
     s->model->eval(w->state, wi, b->wo, s_rgb, w->score);
     if (!PATH_PLAIN && s->shows_width) path_scatter_widths(s->model, w->state, wi, b->wo, w->score);
 }

@@ -15,6 +15,7 @@ void path_setting_init(struct path_setting *s, const struct scene *scene, const 
     s->guided_paths = s->lights.has_lamp;
     s->hides_below = scene_sheet_hides(scene, (const float[3]){0, 0, -1});
     s->shows_width = model->width != NULL && scene_shows_sections(scene);
+    s->has_films = scene_has_films(scene);
     s->roulette_below = PATH_SURFACE_ROULETTE_BELOW;
     if (s->guided_paths) light_guide_energy_of(model, state, &s->energy[0]);
     s->has_strips = s->lights.has_lamp && model->lobe_rad != NULL;
@@ -38,6 +39,6 @@ void path_setting_choose(struct path_setting *s)
 {
     const struct scattering_model *m = s->model;
     const bool simple_model = m->view_of != NULL && !m->flat_section && !m->near_field && !m->across_width;
-    s->plain = simple_model && !s->shows_width && s->n_set == 1 && s->discrepancy == NULL && s->speckle.table == NULL &&
-               s->lights.image == NULL && s->n_traced == 0 && s->begin == NULL;
+    s->plain = simple_model && !s->has_films && !s->shows_width && s->n_set == 1 && s->discrepancy == NULL &&
+               s->speckle.table == NULL && s->lights.image == NULL && s->n_traced == 0 && s->begin == NULL;
 }

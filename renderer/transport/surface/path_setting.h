@@ -28,6 +28,7 @@ struct path_setting {
     float lobe_rad[SCATTERING_MAX_SET]; /* by material group: scattering_model.lobe_rad; only with has_strips */
     bool hides_below;                   /* scene_sheet_hides all directions downwards */
     bool shows_width;     /* the scene has the sections of the fibers as surfaces, and the model states their widths */
+    bool has_films;       /* the scene has films: hits ask whether they are on one */
     float roulette_below; /* throughput under which paths are ended at random; 0: never */
     /* n_traced > 0 ends paths at their n_traced-th hit. Light that arrives there directly from lamps is added as usual;
      * for all other light `finish` returns the radiance in rgb that goes back along the ray. Only for one lamp without

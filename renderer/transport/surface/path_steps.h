@@ -56,10 +56,11 @@ static void bounce_at(struct walk *w, const struct scene_ray *ray, struct bounce
     b->has_speckle = false;
     memcpy(b->offset_mm, ray->offset_mm, sizeof b->offset_mm);
     unwrapped(hit->position_mm, b->offset_mm, b->position_mm);
-    const bool flat = !PATH_PLAIN && w->s->model->flat_section;
+    if (!PATH_PLAIN && w->s->has_films) w->film = scene_film(w->s->scene, hit->i_segment);
+    const bool flat = !PATH_PLAIN && (w->s->model->flat_section || w->film != NULL);
     float section[3];
     const bool bent = (flat || path_factor_wanted(w->s)) && scene_bent_normal(w->s->scene, hit, b->normal);
-    if (!PATH_PLAIN && w->s->model->near_field)
+    if (!PATH_PLAIN && w->s->model->near_field && w->film == NULL)
         fiber_frame_flat_in(&b->frame, hit->tangent, hit->normal);
     else if (!flat)
         fiber_frame_from(&b->frame, hit->tangent);
@@ -71,7 +72,7 @@ static void bounce_at(struct walk *w, const struct scene_ray *ray, struct bounce
         fiber_frame_flat(&b->frame, hit->tangent);
     if (!PATH_PLAIN && !bent) memcpy(b->normal, (const float[3]){0, 0, 1}, sizeof b->normal);
     fiber_frame_to_local(&b->frame, back, b->wo);
-    if (!PATH_PLAIN && w->s->n_set > 1) {
+    if (!PATH_PLAIN && w->s->n_set > 1 && w->film == NULL) {
         w->i_set = scene_group_of(w->s->scene, hit->i_segment);
         w->state = w->s->state[w->i_set];
     }
@@ -125,6 +126,7 @@ static void trace_guided_path(struct walk *w, size_t i_lamp, const struct bounce
     }
     size_t n_flat = s->want_jacobian ? 3 * s->n_set * s->model->n_param : 0, i_set = w->i_set;
     const struct scattering_state *state = w->state;
+    const struct film_material *film = w->film;
     float throughput[3], h[PATH_N_DERIVATIVE];
     memcpy(throughput, w->throughput, sizeof throughput);
     memcpy(h, w->h, n_flat * sizeof *h);
@@ -135,6 +137,7 @@ static void trace_guided_path(struct walk *w, size_t i_lamp, const struct bounce
     if (path_walk_recorded(w)) memcpy(w->step->guided_wi, wi, sizeof wi);
     follow_guided_path(w, i_lamp, b, direction, weight);
     w->state = state;
+    w->film = film;
     w->i_set = i_set;
     w->h = w->h_walk;
     memcpy(w->throughput, throughput, sizeof throughput);
@@ -144,6 +147,7 @@ static void trace_guided_path(struct walk *w, size_t i_lamp, const struct bounce
 static float guided_path_probability(const struct walk *w)
 {
     const struct light_guide_energy *e = &w->s->energy[w->i_set];
+    if (path_walk_on_film(w)) return 0; /* nothing goes through it */
     float forward = 0, all = 0;
     for (int c = 0; c < 3; c++) {
         forward += w->throughput[c] * e->forward[c];

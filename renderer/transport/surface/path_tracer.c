@@ -16,6 +16,7 @@ static void walk_start(struct walk *w, const struct path_setting *s, bool record
     w->has_strips = s->has_strips && !recorded;
     w->state = s->state[0];
     w->i_set = 0;
+    w->film = NULL;
     for (int c = 0; c < 3; c++) w->throughput[c] = 1;
     for (size_t k = 0; k < w->n_lamp; k++) w->weight[k] = 1;
     w->h = w->h_walk;

@@ -41,6 +41,7 @@ struct walk {
     struct path_step *step;               /* the step that is being recorded, or NULL */
     const struct scattering_state *state; /* of the fiber that was hit */
     size_t i_set;                         /* its parameter set */
+    const struct film_material *film;     /* the fiber that was hit is a film; NULL: state is its scattering */
     bool last;                            /* the present bounce is the n_traced-th */
     float to_camera[3], cos_camera; /* direction to the camera from the first bounce, and its cosine to the cloth's
                                        normal there; only with a factor (path_factor.h), after the first bounce */
@@ -67,13 +68,18 @@ static inline bool path_walk_hides(const struct walk *w, const float direction[3
     return w->s->hides_below && direction[2] <= 0;
 }
 
+/* Whether the present hit is on a film (path_film.h). */
+static inline bool path_walk_on_film(const struct walk *w) { return !PATH_PLAIN && w->film != NULL; }
+
 static inline bool path_walk_recorded(const struct walk *w) { return !PATH_PLAIN && w->step != NULL; }
 
-/* Whether the lamp is found by direct connections alone: at the first hit of a path that always ends there. */
+/* Whether the lamp is found by direct connections alone: at the first hit of a path that always ends there. Films have
+ * lobes that are too narrow for it. */
 static inline bool path_walk_connects_all(const struct walk *w)
 {
     const struct path_setting *s = w->s;
-    return !PATH_PLAIN && w->last && s->n_traced == 1 && !s->lights.has_constant && s->lights.image == NULL;
+    return !PATH_PLAIN && w->last && w->film == NULL && s->n_traced == 1 && !s->lights.has_constant &&
+           s->lights.image == NULL;
 }
 
 #endif

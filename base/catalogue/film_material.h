@@ -1,0 +1,34 @@
+/* The metal of a film: a thread of metallised plastic (lame, lurex), or a sequin. Plain data, which a described cloth
+ * states and a scene carries to the tracer. */
+#ifndef SELVEDGE_BASE_FILM_MATERIAL_H
+#define SELVEDGE_BASE_FILM_MATERIAL_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+/* Films are groups of fibers of their own (fiber_set.h), after those of the kinds of yarn. */
+enum { FILM_MAX_GROUP = 5 };
+
+struct film_material {
+    float color[3];  /* reflectance at normal incidence, in (0, 1] */
+    float roughness; /* alpha of the GGX distribution of facets, in (0, 1] */
+};
+
+/* The films of a cloth: material k is that of group first_group + k. */
+struct film_groups {
+    size_t first_group, n; /* n 0: none */
+    struct film_material material[FILM_MAX_GROUP];
+};
+
+/* The material of a group; NULL: it is no film. */
+static inline const struct film_material *film_of_group(const struct film_groups *f, size_t group)
+{
+    return group >= f->first_group && group - f->first_group < f->n ? &f->material[group - f->first_group] : NULL;
+}
+
+/* Names of metals in order, ended by NULL. */
+extern const char *const film_metal_names[];
+/* Sets the color of a named metal: reflectance at normal incidence. False: no such metal. */
+bool film_metal_color(const char *name, float color[3]);
+
+#endif
