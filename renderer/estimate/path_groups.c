@@ -31,7 +31,8 @@ static bool differ_in_lamp_only(const struct configuration *a, const struct conf
     bool lit = a->light != LIGHT_NO_LAMP && b->light != LIGHT_NO_LAMP;
     bool same_camera = a->camera == b->camera && a->camera_theta_rad == b->camera_theta_rad &&
                        a->camera_phi_rad == b->camera_phi_rad && a->camera_distance_m == b->camera_distance_m &&
-                       a->crop_m == b->crop_m && a->blur_m == b->blur_m && a->crop_aspect == b->crop_aspect;
+                       a->crop_m == b->crop_m && a->blur_m == b->blur_m && a->aperture_m == b->aperture_m &&
+                       a->focus_m == b->focus_m && a->crop_aspect == b->crop_aspect;
     return lit && same_camera && a->cloth_rotation_rad == b->cloth_rotation_rad && a->environment == b->environment &&
            memcmp(a->environment_rgb, b->environment_rgb, sizeof a->environment_rgb) == 0;
 }

@@ -66,11 +66,13 @@ static void run_row(void *context, size_t i_row, size_t i_thread)
     for (size_t i = 0; i < r->n_path && !progress_cancelled(r->progress); i++) {
         struct rng rng;
         struct scene_ray ray;
+        struct camera pinhole;
         double point[2], xy[2];
         rng_start(&rng, &key, (uint32_t)i_row, (uint32_t)i);
         for (int a = 0; a < 2; a++) point[a] = rng_double(&rng);
         camera_blur(&r->camera, point, &rng, xy);
-        if (camera_ray(&r->camera, r->whole.scene, xy, &ray)) add_path(r, &ray, &rng, &r->sums[i_row]);
+        const struct camera *camera = camera_through_lens(&r->camera, &rng, &pinhole, xy);
+        if (camera_ray(camera, r->whole.scene, xy, &ray)) add_path(r, &ray, &rng, &r->sums[i_row]);
     }
 }
 

@@ -56,11 +56,11 @@ static void albedo_of(const struct run *r, const struct scene_hit *hit, const fl
 }
 
 /* feature: preset to 0. */
-static void see(const struct run *r, const double xy[2], float feature[N_FEATURE])
+static void see(const struct run *r, const struct camera *camera, const double xy[2], float feature[N_FEATURE])
 {
     struct scene_ray ray;
     struct scene_hit hit;
-    if (!camera_ray(&r->camera, r->q->scene, xy, &ray) || !scene_trace(r->q->scene, &ray, &hit)) return;
+    if (!camera_ray(camera, r->q->scene, xy, &ray) || !scene_trace(r->q->scene, &ray, &hit)) return;
     albedo_of(r, &hit, ray.direction, feature + FEATURE_ALBEDO);
     describe_tangent(r, hit.tangent, feature + FEATURE_TANGENT);
     feature[FEATURE_SEEN] = 1;
@@ -80,6 +80,7 @@ static void run_row(void *context, size_t y, size_t i_thread)
     for (size_t x = 0; x < q->width && !progress_cancelled(r->progress); x++) {
         double sum[N_FEATURE] = {0}, square[N_FEATURE] = {0}, n = (double)q->n_sample;
         struct rng rng;
+        struct camera pinhole;
         rng_start(&rng, &key, (uint32_t)(y * q->width + x), 0);
         for (size_t i = 0; i < q->n_sample; i++) {
             float feature[N_FEATURE] = {0};
@@ -87,7 +88,8 @@ static void run_row(void *context, size_t y, size_t i_thread)
                                ((double)y + rng_double(&rng)) / (double)q->height},
                    xy[2];
             camera_blur(&r->camera, point, &rng, xy);
-            see(r, xy, feature);
+            const struct camera *camera = camera_through_lens(&r->camera, &rng, &pinhole, xy);
+            see(r, camera, xy, feature);
             for (size_t k = 0; k < N_FEATURE; k++) {
                 sum[k] += (double)feature[k];
                 square[k] += (double)feature[k] * (double)feature[k];

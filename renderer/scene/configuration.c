@@ -28,6 +28,7 @@ static bool camera_makes_sense(const struct configuration *c)
 {
     return c->camera_theta_rad >= 0 && c->camera_theta_rad < M_PI_2 && c->camera <= CAMERA_FAR_FIELD &&
            (c->camera == CAMERA_FAR_FIELD || c->camera_distance_m > 0) && c->crop_m > 0 && c->blur_m >= 0 &&
+           c->aperture_m >= 0 && c->focus_m >= 0 && (c->aperture_m == 0 || c->camera != CAMERA_FAR_FIELD) &&
            c->crop_aspect >= 0 && isfinite(c->crop_aspect) && c->contrast_cells != 1 &&
            c->contrast_cells <= CONFIGURATION_MAX_CELLS;
 }

@@ -52,6 +52,8 @@ struct configuration {
     double crop_m; /* 0.01: edge of the square crop, measured at the orbit centre perpendicular to the view */
 
     double blur_m;      /* standard deviation of the camera's Gaussian blur, measured like crop_m; 0: a sharp camera */
+    double aperture_m;  /* diameter of a thin lens in the place of the perspective camera; 0: everything is sharp */
+    double focus_m;     /* distance from the lens of the plane that is sharp; 0: the orbit centre lies in it */
     double crop_aspect; /* width over height of the crop, whose width is crop_m; 0: 1 */
     double environment_rgb[3];             /* radiance of a constant environment, besides the lamp; 0: none */
     const struct environment *environment; /* an image around the scene, fixed to the world (not turned with the cloth),

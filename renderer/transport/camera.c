@@ -9,6 +9,10 @@ void camera_init(struct camera *m, const struct configuration *c)
     m->blur[0] = c->blur_m / c->crop_m;
     m->blur[1] = m->blur[0] * aspect;
     m->far_field = c->camera == CAMERA_FAR_FIELD;
+    m->lens_mm = m->far_field ? 0.0 : 500.0 * c->aperture_m;
+    const double out_of_focus = c->focus_m > 0.0 ? 1.0 - c->camera_distance_m / c->focus_m : 0.0;
+    m->lens_move[0] = m->lens_mm * out_of_focus / crop;
+    m->lens_move[1] = m->lens_move[0] * aspect;
     /* far-field: any, as long as all of the crop's rays start above the cloth */
     double distance = m->far_field ? 1e3 + 0.5 * crop / aspect * tan(theta) : 1e3 * c->camera_distance_m;
     double back[3] = {sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)};
@@ -27,6 +31,27 @@ void camera_blur(const struct camera *m, const double xy[2], struct rng *rng, do
     double normal[2] = {0.0, 0.0};
     if (m->blur[0] > 0.0) rng_normal_pair(rng, normal);
     for (int a = 0; a < 2; a++) blurred[a] = xy[a] + m->blur[a] * normal[a];
+}
+
+void camera_at_lens(const struct camera *m, const double at[2], struct camera *pinhole, double xy[2])
+{
+    const double *edge[2] = {m->right_mm, m->up_mm};
+    *pinhole = *m;
+    for (int k = 0; k < 2; k++) {
+        double length2 = 0.0;
+        for (int a = 0; a < 3; a++) length2 += edge[k][a] * edge[k][a];
+        for (int a = 0; a < 3; a++) pinhole->eye_mm[a] += at[k] * m->lens_mm * edge[k][a] / sqrt(length2);
+    }
+    xy[0] += at[0] * m->lens_move[0];
+    xy[1] -= at[1] * m->lens_move[1];
+}
+
+const struct camera *camera_through_lens(const struct camera *m, struct rng *rng, struct camera *pinhole, double xy[2])
+{
+    if (!(m->lens_mm > 0.0)) return m;
+    const double radius = sqrt(rng_double(rng)), angle = 2.0 * M_PI * rng_double(rng);
+    camera_at_lens(m, (const double[2]){radius * cos(angle), radius * sin(angle)}, pinhole, xy);
+    return pinhole;
 }
 
 void camera_direction(const struct camera *m, const double xy[2], double d[3])

@@ -235,17 +235,43 @@ static status check_cells(const struct job_results *results, const json_t *given
     return STATUS_OK;
 }
 
+/* What a lens and a preview of the smooth surface do not go with. */
+static status check_preview(const struct job_setup *setup, const struct job_surface_picture *p, const json_t *given,
+                            size_t i, struct error *err)
+{
+    const bool sheared = p->method == JOB_PICTURE_SHEARED, lens = p->aperture_mm > 0.0;
+    const struct {
+        bool wrong;
+        const char *key, *why;
+    } row[] = {
+        {lens && setup->camera_far_field, "aperture_mm", "'camera.far_field' is true: such a camera has no lens"},
+        {lens && !isnan(p->ground_gap_mm), "aperture_mm", "the ground below the cloth is not seen through a lens"},
+        {lens && p->filter, "filter",
+         "'aperture_mm' is, too: take the method \"sheared\", which filters what a lens "
+         "blurs"},
+        {!lens && !isnan(p->focus_mm), "focus_mm", "there is no 'aperture_mm'"},
+        {sheared && p->filter, "filter", "the method \"sheared\" filters already"},
+        {!sheared && json_object_get(given, "preview_filter") != NULL, "preview_filter", "'method' is not \"sheared\""},
+    };
+    for (size_t k = 0; k < sizeof row / sizeof *row; k++) {
+        char field[64];
+        if (!row[k].wrong) continue;
+        snprintf(field, sizeof field, "pictures[%zu].%s", i, row[k].key);
+        return error_set_field(err, STATUS_INVALID, field, "'%s' is given, but %s", field, row[k].why);
+    }
+    return STATUS_OK;
+}
+
 /* Tables of diffusion are made over the job's sheet, which the studio does not have. */
 static status check_studio_method(const struct job_surface_picture *p, size_t i, struct error *err)
 {
     char field[64];
     snprintf(field, sizeof field, "pictures[%zu].%s", i, p->reference ? "reference" : "method");
-    if (p->method == JOB_PICTURE_DIFFUSION)
-        return error_set_field(
-            err, STATUS_INVALID, field,
-            "'pictures[%zu].method' is \"diffusion\", which the studio does not have: take \"fast\", "
-            "\"path\" or \"dual\"",
-            i);
+    if (p->method == JOB_PICTURE_DIFFUSION || p->method == JOB_PICTURE_SHEARED)
+        return error_set_field(err, STATUS_INVALID, field,
+                               "'pictures[%zu].method' is \"%s\", which the studio does not have: take \"fast\", "
+                               "\"path\" or \"dual\"",
+                               i, picture_method_name[p->method]);
     if (p->reference && p->method == JOB_PICTURE_PATH)
         return error_set_field(err, STATUS_INVALID, field,
                                "'%s' is true, but 'method' is \"path\": such a picture is its own reference", field);
@@ -317,6 +343,9 @@ status job_check_pictures(const struct option_value *v, struct error *err)
         if (s == STATUS_OK) s = check_picture(v->section->setup, v->section->fit, v->section->results, i, err);
         if (s == STATUS_OK)
             s = check_deep_paths(&v->section->results->surface_picture[i], json_array_get(v->value, i), i, err);
+        if (s == STATUS_OK)
+            s = check_preview(v->section->setup, &v->section->results->surface_picture[i], json_array_get(v->value, i),
+                              i, err);
         if (s == STATUS_OK) s = check_cells(v->section->results, json_array_get(v->value, i), i, err);
     }
     return s;

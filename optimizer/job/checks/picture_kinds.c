@@ -87,6 +87,7 @@ void job_picture_studio(enum job_picture_kind kind, struct job_surface_picture *
     *p = (struct job_surface_picture){.kind = kind,
                                       .wrap_deg = 180.0,
                                       .lamp_sharpness = NAN,
+                                      .focus_mm = NAN,
                                       .ground_gap_mm = NAN,
                                       .ground_albedo = 0.5,
                                       .px = STUDIO_PX,

@@ -58,6 +58,9 @@ struct job_surface_picture {
     double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
     double lamp_sharpness; /* of a Gaussian lamp in place of the document's; NaN: the document's */
     double width_mm;       /* width of the area in the picture */
+    double aperture_mm;    /* diameter of the camera's lens; 0: a pinhole */
+    double focus_mm;       /* distance of the lens from what is sharp; NaN: the orbit center is */
+    int preview_filter;    /* of JOB_PICTURE_SHEARED: enum ray_filter_way */
     size_t px, sample;
     enum job_picture_method method;
     bool reference;                      /* also path by path, and compared with that */

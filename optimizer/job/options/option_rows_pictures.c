@@ -11,6 +11,8 @@ static const char *const kind_names[] = {"measurement", "swatch", "roll",       
                                          "close_up",    "far",    "lit_through", NULL};
 static const char of_measurement[] = "required of `kind` `measurement`, refused of others";
 static const char *const deep_light_names[] = {"directions", "cells", NULL};
+/* In the order of enum ray_filter_way. */
+static const char *const preview_filter_names[] = {"passes", "whole", "axes", "none", NULL};
 static const char *const visibility_names[] = {"traced", "tables", NULL};
 /* " `path`: every path is traced. `fast`: ...", with a blank in front. */
 static const char method_meaning[] =
@@ -117,6 +119,22 @@ const struct job_option option_rows_pictures[] = {
      .unit = "mm",
      .standard = "40",
      .meaning = "Width and height of what the picture shows, at the orbit center."},
+    {.path = "pictures[].aperture_mm",
+     .kind = OPTION_NUMBER,
+     OF_PICTURE(aperture_mm),
+     RANGE(0, 1000),
+     .unit = "mm",
+     .standard = "0",
+     .meaning =
+         "Diameter of the camera's lens, which blurs what is out of focus. Not with `camera.far_field`, `filter` or "
+         "a ground."},
+    {.path = "pictures[].focus_mm",
+     .kind = OPTION_NUMBER,
+     OF_PICTURE(focus_mm),
+     RANGE(1, 100000),
+     .unit = "mm",
+     .left_out = "to the orbit center",
+     .meaning = "Distance of the lens from the sharp plane."},
     {.path = "pictures[].px",
      .kind = OPTION_COUNT,
      OF_PICTURE(px),
@@ -181,6 +199,14 @@ const struct job_option option_rows_pictures[] = {
      .meaning =
          "Of `deep_light` `directions`: paths that make its table, in 10 to 20 microseconds of a processor each. "
          "The largest number of all pictures counts. Refused in pictures that have no such table."},
+    {.path = "pictures[].preview_filter",
+     .kind = OPTION_CHOICE,
+     OF_PICTURE(preview_filter),
+     .choice = preview_filter_names,
+     .standard = "\"passes\"",
+     .meaning =
+         "Of method `sheared`, which takes up to 64 `samples`: four `passes`; for comparison one `whole` sum, means "
+         "along `axes`, or `none`."},
     {.path = "pictures[].speckle",
      .kind = OPTION_BOOL,
      OF_PICTURE(speckle),

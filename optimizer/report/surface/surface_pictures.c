@@ -13,6 +13,7 @@
 #include "optimizer/report/surface/surface_filter.h"
 #include "optimizer/report/surface/surface_ground.h"
 #include "optimizer/report/surface/surface_passes.h"
+#include "optimizer/report/surface/surface_preview.h"
 #include "optimizer/report/surface/surface_studio.h"
 #include "optimizer/report/surface/surface_tables.h"
 #include "optimizer/report/surface/surface_view.h"
@@ -223,7 +224,9 @@ static status render_picture(struct report *report, const struct one_picture *on
     status s = surface_fit_make(report, &by, progress, one->fit, err);
     if (s == STATUS_OK) s = surface_filter_init(report, one->i, &by, one->tables, progress, &filter, err);
     while (s == STATUS_OK && so_far->n_sample < q->n_sample) {
-        s = surface_passes_add(report, &by, progress, so_far, err);
+        s = one->how.method == JOB_PICTURE_SHEARED
+                ? surface_preview_render(report, one->i, one->how.look, &by, progress, so_far, err)
+                : surface_passes_add(report, &by, progress, so_far, err);
         if (s == STATUS_OK) s = write_entry(report, one, &filter, so_far, entry, err);
     }
     if (s == STATUS_OK && *entry == NULL) s = write_entry(report, one, &filter, so_far, entry, err);

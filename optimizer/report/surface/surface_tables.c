@@ -14,6 +14,7 @@
 /* Three traced hits leave a third of the error of one (renderer/fast/NOTES.md); the transfer to a cell has an error of
  * 1 to 2 % by so many paths. */
 enum { N_TRACED = 3, CELL_PATHS = 8000, SPREAD_PATHS = 1024 };
+enum { LOOK_TEXELS = 256, LOOK_EDGE = 8, LOOK_BASIS = 4, LOOK_PATHS = 100000 };
 /* Samples of a picture for a path of the fit, and the most paths, which take six seconds of a processor. By a
  * quarter as many for 64 x 64 pixels no half of gabardine's paths served the other. */
 enum { SAMPLES_OF_FIT = 1, MOST_FIT = 1 << 18 };
@@ -190,18 +191,40 @@ static status get_pile(struct report *report, const struct progress *progress, s
     return s;
 }
 
+/* The mean appearance of the flat cloth, from so many paths with sixteen lights each: seconds, so it is not stored. */
+static status get_look(struct report *report, const struct progress *progress, struct surface_tables *t,
+                       struct error *err)
+{
+    const struct pipeline_model *model = &report->model[report_best_model(report)];
+    const struct appearance_table_option o = {.texels = LOOK_TEXELS,
+                                              .view_edge = LOOK_EDGE,
+                                              .light_edge = LOOK_EDGE,
+                                              .n_basis = LOOK_BASIS,
+                                              .n_path = LOOK_PATHS,
+                                              .seed = report->in.job->seed ^ 0x6c6f6f6bu};
+    const struct radiance_input in = {.scene = made_cloth_scene(report->in.made, model->setup),
+                                      .model = &model->setup->appearance,
+                                      .param = model->fit->result.param,
+                                      .n_set = model->setup->sets.n_set};
+    struct progress silent = progress_silent(progress);
+    status s = appearance_table_make(&in, &o, report->in.job->tools->pool, &silent, &t->look, err);
+    t->looked = s == STATUS_OK;
+    return s;
+}
+
 status surface_tables_get(struct report *report, const struct progress *progress, struct surface_tables *t,
                           struct error *err)
 {
     const struct pipeline_model *model = &report->model[report_best_model(report)];
     const bool tables = wants_tables(report->in.results, false), studio = wants_tables(report->in.results, true),
                averages = wants_averages(report->in.results, true),
-               pile = wants_method(report->in.results, JOB_PICTURE_DIFFUSION);
+               pile = wants_method(report->in.results, JOB_PICTURE_DIFFUSION),
+               look = wants_method(report->in.results, JOB_PICTURE_SHEARED);
     *t = (struct surface_tables){0};
-    if (!tables && !studio && !averages && !pile) return STATUS_OK;
+    if (!tables && !studio && !averages && !pile && !look) return STATUS_OK;
     if (model->setup->appearance.kind != MODEL_SURFACE ||
         scattering_frame_reason(model->setup->appearance.surface) != NULL) {
-        if (tables || studio || pile || wants_averages(report->in.results, false))
+        if (tables || studio || pile || look || wants_averages(report->in.results, false))
             worker_status_warn(report->in.job->tools->status,
                                "all pictures are rendered path by path: there are no tables for the model '%s'",
                                model->setup->appearance.id);
@@ -215,6 +238,7 @@ status surface_tables_get(struct report *report, const struct progress *progress
                              err);
         t->averaged = s == STATUS_OK;
     }
+    if (s == STATUS_OK && look) s = get_look(report, progress, t, err);
     if (s == STATUS_OK && pile) s = get_pile(report, progress, t, err);
     if (s == STATUS_OK && studio) s = get_studio_tables(report, progress, t, err);
     if (s != STATUS_OK || !tables) return s;
@@ -228,6 +252,7 @@ void surface_tables_release(struct surface_tables *t)
     fast_tables_release(&t->tables);
     fast_tables_release(&t->studio);
     dual_tables_release(&t->averages);
+    appearance_table_release(&t->look);
 }
 
 struct surface_method surface_tables_method(const struct surface_tables *t, const struct job_surface_picture *p)
@@ -235,6 +260,7 @@ struct surface_method surface_tables_method(const struct surface_tables *t, cons
     const bool studio = p->kind != JOB_KIND_MEASUREMENT;
     const bool has = p->method == JOB_PICTURE_DUAL        ? t->averaged
                      : p->method == JOB_PICTURE_DIFFUSION ? t->piled
+                     : p->method == JOB_PICTURE_SHEARED   ? t->looked
                      : studio                             ? t->has_studio
                                                           : t->present;
     return (struct surface_method){.method = has ? p->method : JOB_PICTURE_PATH,
@@ -243,7 +269,8 @@ struct surface_method surface_tables_method(const struct surface_tables *t, cons
                                             .n_traced = N_TRACED,
                                             .deep = by_directions(p)},
                                    .dual = {&t->averages, DENSITY, DENSITY},
-                                   .diffusion = {&t->pile}};
+                                   .diffusion = {&t->pile},
+                                   .look = &t->look};
 }
 
 void surface_method_apply(const struct surface_method *m, struct radiance_input *input)

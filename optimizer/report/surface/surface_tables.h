@@ -8,6 +8,7 @@
 #include "renderer/estimate/render.h"
 #include "renderer/fast/deep_fit.h"
 #include "renderer/fast/fast_tables.h"
+#include "renderer/preview/appearance_table.h"
 #include "renderer/quick/diffusion_tables.h"
 #include "renderer/quick/dual_tables.h"
 
@@ -15,10 +16,12 @@ struct surface_tables {
     struct fast_tables tables, studio; /* of measurements, over the job's sheet; of studio pictures, without a sheet */
     struct dual_tables averages;
     struct diffusion_tables pile;
+    struct appearance_table look; /* of previews of the smooth surface */
     bool present; /* false: no picture asks for tables, or the model's fibers are flat, which a warning says */
     bool has_studio;
     bool averaged; /* the same of the averages */
     bool piled;    /* the same of the pile */
+    bool looked;   /* the same of the look */
 };
 
 /* The method of one picture. */
@@ -27,6 +30,7 @@ struct surface_method {
     struct fast_option fast;
     struct dual_option dual;
     struct diffusion_option diffusion;
+    const struct appearance_table *look; /* of JOB_PICTURE_SHEARED */
 };
 
 /* What a picture by tables has of its own (renderer/fast/deep_fit.h). */

@@ -50,6 +50,8 @@ status surface_view_init(const struct report *report, size_t i, struct surface_v
                                    p->camera_phi_deg, p->cloth_rotation_deg);
     c->crop_m = mm * p->width_mm;
     c->crop_aspect = 1.0;
+    c->aperture_m = mm * p->aperture_mm;
+    c->focus_m = isnan(p->focus_mm) ? 0.0 : mm * p->focus_mm;
     c->environment = report->in.job->rows->environment;
     if (!isnan(p->lamp_sharpness)) {
         c->light = LIGHT_GAUSSIAN;

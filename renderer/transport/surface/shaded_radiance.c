@@ -74,10 +74,11 @@ uint64_t shaded_trace(const void *state, const struct radiance_block *b, float *
     uint64_t n_bounce = 0;
     for (size_t i = 0; i < b->n_path; i++) {
         struct scene_ray ray;
+        struct camera pinhole;
         double xy[2];
         if (progress_cancelled(b->progress)) break;
         camera_blur(camera, b->xy[i], &b->rng[i], xy);
-        if (!camera_ray(camera, setting->scene, xy, &ray)) continue;
+        if (!camera_ray(camera_through_lens(camera, &b->rng[i], &pinhole, xy), setting->scene, xy, &ray)) continue;
         n_bounce += s->method->shade(setting, &ray, &b->rng[i], value + 3 * i);
     }
     return n_bounce;

@@ -80,10 +80,12 @@ static uint64_t trace(const void *state, const struct radiance_block *b, float *
     for (size_t k = 0; k < b->n_path; k++) {
         const size_t i = order[k];
         struct scene_ray ray;
+        struct camera pinhole;
         double xy[2];
         if (progress_cancelled(b->progress)) break; /* a block of white cloth takes longer than a caller will wait */
         camera_blur(camera, b->xy[i], &b->rng[i], xy);
-        if (!camera_ray(camera, s->scene, xy, &ray)) continue; /* sees nothing: adds 0 */
+        if (!camera_ray(camera_through_lens(camera, &b->rng[i], &pinhole, xy), s->scene, xy, &ray))
+            continue; /* sees nothing: adds 0 */
         path_trace_lamps(setting, lamp, n_lamp, &ray, &b->rng[i], path);
         n_bounce += path[0].n_bounce;
         for (size_t m = 0; m < b->n_member; m++) {
@@ -102,10 +104,11 @@ static void record_path(const void *state, size_t i_configuration, const double 
     struct path_result path;
     struct scene_ray ray;
     struct path_record steps = {0, record->capacity, record->entry};
+    struct camera pinhole;
     double at[2];
     record->n_entry = record->n_bounce = 0;
     camera_blur(&s->camera[i_configuration], xy, rng, at);
-    if (!camera_ray(&s->camera[i_configuration], s->scene, at, &ray)) return;
+    if (!camera_ray(camera_through_lens(&s->camera[i_configuration], rng, &pinhole, at), s->scene, at, &ray)) return;
     path_trace(&s->setting[i_configuration], &ray, rng, &path, &steps);
     record->n_entry = record->n_bounce = steps.n_step;
     memcpy(value, path.radiance, sizeof path.radiance);

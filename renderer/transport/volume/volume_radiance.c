@@ -74,7 +74,9 @@ static bool enter(const struct volume_state *s, const struct camera *camera, con
                   struct volume_ray *ray)
 {
     double at[2], origin_mm[3], direction[3];
+    struct camera pinhole;
     camera_blur(camera, xy, rng, at);
+    camera = camera_through_lens(camera, rng, &pinhole, at);
     camera_origin(camera, at, origin_mm);
     camera_direction(camera, at, direction);
     return volume_ray_enter(s->scene, origin_mm, direction, ray);
@@ -87,10 +89,12 @@ static uint64_t trace_bent(const struct volume_state *s, const struct radiance_b
     uint64_t n_bounce = 0;
     for (size_t i = 0; i < b->n_path && !progress_cancelled(b->progress); i++) {
         struct volume_result path;
+        struct camera pinhole;
         double at[2], origin_mm[3], direction[3];
         camera_blur(camera, b->xy[i], &b->rng[i], at);
-        camera_origin(camera, at, origin_mm);
-        camera_direction(camera, at, direction);
+        const struct camera *from = camera_through_lens(camera, &b->rng[i], &pinhole, at);
+        camera_origin(from, at, origin_mm);
+        camera_direction(from, at, direction);
         volume_bent_trace(&s->setting[b->member[0]], origin_mm, direction, &b->rng[i], &path);
         memcpy(value + i * (3 + s->n_jac), path.radiance, sizeof path.radiance);
         n_bounce += path.n_bounce;
