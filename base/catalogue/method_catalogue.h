@@ -21,6 +21,7 @@ struct method_info {
     const char *id;               /* "gauss_newton.v1": never used again for another method */
     const char *title;            /* one line for people, with the source */
     unsigned takes;               /* of method_ability */
+    const char *only_model;       /* id of the only model that it fits; NULL: it fits every model */
     uint64_t default_path_budget; /* of one fit; 0: follows from the method's schedule */
     size_t default_max_iteration;
     size_t

@@ -14,9 +14,8 @@
  * parameter that is fixed keeps its value. With a path budget, all renderings shrink alike. Errors come from the same
  * 4 estimates.
  */
-#include "optimizer/fit/descent/descent_methods.h"
+#include "optimizer/fit/descent/descent_end.h"
 #include "optimizer/fit/descent/rescale.h"
-#include "optimizer/fit/descent/rest_check.h"
 #include "renderer/estimate/estimate.h"
 
 #include <math.h>
@@ -24,7 +23,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N = FIT_MAX_PARAM, N_RUN = 6, N_EXTRA = 10, FIRST_I = 50, N_FINAL = 4, N_LAST = 5 };
+enum { N = FIT_MAX_PARAM, N_RUN = 6, N_EXTRA = 10, FIRST_I = 50, N_LAST = 5 };
 
 static const uint64_t published_path = 64 * 64 * 64;
 static const double first_move = 0.005, factor = 3.0, turn_limit = 0.3;
@@ -190,44 +189,6 @@ static void judge(const struct winner *best, const struct rest_check *end, struc
                  best->turn, turn_limit, result->objective.value, end->promised, end->noise);
 }
 
-/* Estimates objective and errors at the winner from renderings at its parameters alone. */
-static status finish(struct sgd *g, const struct winner *best, struct fit_result *result, struct error *err)
-{
-    const struct fit_problem *problem = g->run.problem;
-    struct linear_history history;
-    struct linear_model model = {0};
-    struct rest_check end = {0};
-    double x[N];
-    linear_history_init(&history, problem->observation, g->run.coordinate, problem->n_param);
-    status s = linear_model_init(&model, 3 * problem->observation->n, problem->n_param, err);
-    for (size_t p = 0; p < problem->n_param; p++) x[p] = coordinate_from_param(&g->run.coordinate[p], g->param[p]);
-    for (int k = 0; k < N_FINAL && s == STATUS_OK; k++) {
-        struct fit_step step = {.phase = "final", .param = g->param};
-        s = descent_estimate(&g->run, g->param, g->next_key++, true, err);
-        if (s == STATUS_OK) s = descent_report(&g->run, &step, err);
-        if (s == STATUS_OK) s = linear_history_append(&history, x, g->run.replica[0], g->run.replica[1], err);
-    }
-    if (s == STATUS_OK) s = linear_model_pool(&model, &history, x, err);
-    if (s == STATUS_OK) {
-        memcpy(result->param, g->param, sizeof g->param);
-        result->n_step = g->run.n_step;
-        result->n_path = g->run.n_path_total;
-        result->wall_s = g->run.wall_s;
-        result->objective.value = linear_model_objective(&model, &result->objective.se);
-        result->objective.rel_rms = sqrt(fmax(0.0, result->objective.value) / (double)model.n_row);
-        uncertainty_compute(&model, g->run.coordinate, g->run.fixed, &result->uncertainty);
-        s = rest_check_compute(&g->run, &model, result->objective.value, &end, err);
-    }
-    if (s == STATUS_OK) {
-        judge(best, &end, result);
-        s = cross_validation_compute(&model, problem->observation, g->run.coordinate, g->run.fixed,
-                                     problem->discrepancy, &result->cross_validation, err);
-    }
-    linear_model_release(&model);
-    linear_history_release(&history);
-    return s;
-}
-
 /* Number of renderings of one configuration: for the curves, the first rate, the runs, the extra iterations and the
  * end. */
 static double n_rendering(const struct fit_problem *problem, const struct coordinate *k)
@@ -235,7 +196,7 @@ static double n_rendering(const struct fit_problem *problem, const struct coordi
     size_t n_iteration =
         problem->max_iteration > 0 ? problem->max_iteration : method_published_sgd.default_max_iteration;
     return RESCALE_POINTS * (double)rescale_n_curve(problem, k) +
-           2.0 * (1.0 + (double)(N_RUN * n_iteration) + N_EXTRA + N_FINAL);
+           2.0 * (1.0 + (double)(N_RUN * n_iteration) + N_EXTRA + DESCENT_N_END);
 }
 
 /* Paths of one rendering of every configuration with the fewest paths that an estimate takes. */
@@ -273,6 +234,7 @@ static status run_published_sgd(const struct fit_problem *problem, struct fit_re
 {
     struct sgd *g = calloc(1, sizeof *g);
     struct winner best = {.objective = INFINITY};
+    struct rest_check end = {0};
     memset(result, 0, sizeof *result);
     if (g == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start a fit: out of memory");
     status s = descent_run_init(&g->run, problem, &descent_published_sgd, err);
@@ -294,7 +256,8 @@ static status run_published_sgd(const struct fit_problem *problem, struct fit_re
         s = iterate_more(g, &best, err);
     else
         memcpy(g->param, best.param, sizeof g->param);
-    if (s == STATUS_OK) s = finish(g, &best, result, err);
+    if (s == STATUS_OK) s = descent_end(&g->run, g->param, g->next_key, result, &end, err);
+    if (s == STATUS_OK) judge(&best, &end, result);
 out:
     descent_run_release(&g->run);
     free(g);

@@ -225,6 +225,17 @@ static status check_method(const struct job_fit *fit, struct error *err)
                            method_catalogue_taking(wanted)->id, fit->method);
 }
 
+static status check_only_model(const struct job_fit *fit, struct error *err)
+{
+    const char *only = method_catalogue_find(fit->method)->only_model;
+    for (size_t i = 0; i < fit->n_model && only != NULL; i++)
+        if (strcmp(fit->model[i].id, only) != 0)
+            return error_set_field(err, STATUS_INVALID, "fit.method",
+                                   "'fit.method' is '%s', which fits the model '%s' only, not '%s'", fit->method, only,
+                                   fit->model[i].id);
+    return STATUS_OK;
+}
+
 /* Copies the options that are the same for all models. They have been read into the first model. */
 static status share_common(struct job_fit *fit, struct error *err)
 {
@@ -255,6 +266,7 @@ status job_parse_fit_options(const struct json_field *f, const struct model_info
     if (s == STATUS_OK) s = parse_each(&r, f, "priors", parse_prior, err);
     if (s == STATUS_OK) s = share_common(fit, err);
     if (s == STATUS_OK) s = check_method(fit, err);
+    if (s == STATUS_OK) s = check_only_model(fit, err);
     for (size_t i = 0; i < fit->n_model && s == STATUS_OK; i++) {
         s = job_fit_resolve(model[i]->param, model[i]->n_param, &fit->model[i], resolved, err);
         fit->model[i].first_free = -1;

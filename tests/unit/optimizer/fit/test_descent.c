@@ -5,6 +5,7 @@
 #include "optimizer/fit/descent/bounded_quadratic.h"
 #include "optimizer/fit/descent/descent_methods.h"
 #include "tests/support/descent_fixture.h"
+#include "tests/support/general_methods.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -33,7 +34,7 @@ static status counted_run(void *context, const struct estimator_call *call, cons
 static void test_kind_of_paths(void **state)
 {
     (void)state;
-    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
+    for (const struct descent_method *const *m = general_methods(); *m != NULL; m++) {
         struct descent_fixture x;
         struct fit_result r;
         descent_fixture_init(&x, 1, 400000);
@@ -78,7 +79,7 @@ static void test_progress(void **state)
 {
     (void)state;
     static const uint64_t budget[] = {4000000, 200000}; /* the second is less than published_sgd.v1 needs */
-    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
+    for (const struct descent_method *const *m = general_methods(); *m != NULL; m++) {
         for (size_t i = 0; i < 2; i++) {
             struct descent_fixture x;
             struct fit_result r;
@@ -171,7 +172,7 @@ static void test_the_fraction_of_an_early_end(void **state)
 static void test_least_budget(void **state)
 {
     (void)state;
-    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
+    for (const struct descent_method *const *m = general_methods(); *m != NULL; m++) {
         for (int bounded = 0; bounded < 2; bounded++) {
             struct descent_fixture x;
             struct fit_result r;
@@ -193,7 +194,7 @@ static void test_least_budget(void **state)
 static void test_every_method_recovers(void **state)
 {
     (void)state;
-    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
+    for (const struct descent_method *const *m = general_methods(); *m != NULL; m++) {
         struct descent_fixture x;
         struct fit_result r;
         descent_fixture_init(&x, 1, 400000000);
@@ -210,7 +211,7 @@ static void test_every_method_recovers(void **state)
 static void test_fixed_and_bounds(void **state)
 {
     (void)state;
-    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
+    for (const struct descent_method *const *m = general_methods(); *m != NULL; m++) {
         struct descent_fixture x;
         struct fit_result r;
         descent_fixture_init(&x, 2, 3000000);
@@ -227,7 +228,7 @@ static void test_fixed_and_bounds(void **state)
 static void test_every_method_repeats(void **state)
 {
     (void)state;
-    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
+    for (const struct descent_method *const *m = general_methods(); *m != NULL; m++) {
         struct descent_fixture x;
         struct fit_result a, b;
         descent_fixture_init(&x, 4, 1500000);
@@ -270,7 +271,7 @@ static void test_bounded_quadratic(void **state)
 static void test_bad_problems(void **state)
 {
     (void)state;
-    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
+    for (const struct descent_method *const *m = general_methods(); *m != NULL; m++) {
         struct descent_fixture x;
         struct fit_result r;
         struct error err = {0};

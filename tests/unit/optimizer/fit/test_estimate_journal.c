@@ -2,6 +2,7 @@
  * another fit is not used. */
 #include "optimizer/fit/descent/estimate_journal.h"
 #include "tests/support/descent_fixture.h"
+#include "tests/support/general_methods.h"
 #include "tests/support/scratch_folder.h"
 
 #include <setjmp.h>
@@ -53,7 +54,7 @@ static void resume_after(void **state, const struct descent_method *m, size_t n_
 
 static void test_resume(void **state)
 {
-    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
+    for (const struct descent_method *const *m = general_methods(); *m != NULL; m++) {
         struct descent_fixture x;
         struct fit_result want;
         descent_fixture_init(&x, 4, 1500000);

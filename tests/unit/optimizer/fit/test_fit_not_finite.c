@@ -4,6 +4,7 @@
 #include "optimizer/fit/descent/trace_estimator.h"
 #include "renderer/transport/volume/volume_scene.h"
 #include "tests/support/cloth/hand_weave.h"
+#include "tests/support/general_methods.h"
 #include "tests/support/scan/hand_volume.h"
 
 #include <math.h>
@@ -61,7 +62,7 @@ static void fit(struct trace_estimator *t, long n_before, const char *model, con
                                         .estimator = &e,
                                         .path_budget = 200000,
                                         .max_iteration = 3};
-    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
+    for (const struct descent_method *const *m = general_methods(); *m != NULL; m++) {
         struct error err = {0};
         atomic_store(&n_good, n_before);
         if (fit_run(*m, &problem, NULL, &r, &err) != STATUS_NUMERIC) fail_msg("%s: %s", (*m)->info->id, err.text);

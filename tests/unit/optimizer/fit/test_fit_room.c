@@ -4,6 +4,7 @@
 #include "base/rng.h"
 #include "optimizer/fit/descent/fit_run.h"
 #include "renderer/scattering/appearance.h"
+#include "tests/support/general_methods.h"
 #include "tests/support/tracer/fake_estimator.h"
 
 #include <math.h>
@@ -122,7 +123,7 @@ static void test_as_many_unknowns_as_there_is_room_for(void **state)
     nuisance.stray_light_sd = 0.01;
     nuisance.photograph_gain_sd = 0.001;
     nuisance.n_start = 2;
-    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++)
+    for (const struct descent_method *const *m = general_methods(); *m != NULL; m++)
         if (fit_wide(WIDE, &plain, (*m)->info->id, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
     if (fit_wide(WIDE - 1, &nuisance, method_gauss_newton.id, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
     assert_int_equal(fit_wide(WIDE, &nuisance, method_gauss_newton.id, &r, &err), STATUS_INVALID);

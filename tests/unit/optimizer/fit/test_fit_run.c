@@ -7,6 +7,7 @@
 #include "optimizer/fit/descent/fit_run.h"
 #include "renderer/scattering/appearance.h"
 #include "tests/support/fit_fixture.h"
+#include "tests/support/general_methods.h"
 #include "tests/support/scratch_folder.h"
 
 #include <math.h>
@@ -356,7 +357,7 @@ static void test_resume(void **state)
 static void test_methods_take_priors_as_they_declare(void **state)
 {
     (void)state;
-    for (const struct descent_method *const *m = descent_registry(); *m != NULL; m++) {
+    for (const struct descent_method *const *m = general_methods(); *m != NULL; m++) {
         struct fit_fixture x;
         struct fit_result with, without;
         fit_fixture_init(&x, fit_fixture_mid_range, 1, false, 0.01);

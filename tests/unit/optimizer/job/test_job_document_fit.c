@@ -344,6 +344,7 @@ static void test_methods_get_what_they_take(void **state)
     const struct method_info *m;
     for (size_t i = 0; (m = method_catalogue_at(i)) != NULL; i++) {
         char text[1000];
+        if (m->only_model != NULL) continue;
         for (size_t k = 0; k < sizeof wanted / sizeof *wanted; k++) {
             snprintf(text, sizeof text, FIT_OF("{\"method\":\"%s\",%s}"), m->id, wanted[k].term);
             if ((m->takes & wanted[k].ability) != 0)

@@ -5,6 +5,7 @@
 #include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/photographs/rows/observation_check.h"
+#include "tests/support/general_methods.h"
 #include "tests/support/tracer/fake_estimator.h"
 
 #include <math.h>
@@ -66,7 +67,7 @@ static void test_fewer_numbers_than_parameters(void **state)
 {
     (void)state;
     for (size_t n_row = 1; n_row <= 2; n_row++) {
-        for (const struct descent_method *const *method = descent_registry(); *method != NULL; method++) {
+        for (const struct descent_method *const *method = general_methods(); *method != NULL; method++) {
             struct fixture x;
             struct fit_result r;
             size_t n_undetermined = 0;
@@ -87,7 +88,7 @@ static void test_fewer_numbers_than_parameters(void **state)
 static void test_contradictory(void **state)
 {
     (void)state;
-    for (const struct descent_method *const *method = descent_registry(); *method != NULL; method++) {
+    for (const struct descent_method *const *method = general_methods(); *method != NULL; method++) {
         struct fixture x;
         struct fit_result r;
         setup(&x, FAKE_N_FIT);
@@ -110,7 +111,7 @@ static void test_contradictory(void **state)
 static void test_all_zero(void **state)
 {
     (void)state;
-    for (const struct descent_method *const *method = descent_registry(); *method != NULL; method++) {
+    for (const struct descent_method *const *method = general_methods(); *method != NULL; method++) {
         struct fixture x;
         struct fit_result r;
         setup(&x, FAKE_N_FIT);
@@ -141,7 +142,7 @@ static void test_one_dark_row(void **state)
 static void test_no_row_has_weight(void **state)
 {
     (void)state;
-    for (const struct descent_method *const *method = descent_registry(); *method != NULL; method++) {
+    for (const struct descent_method *const *method = general_methods(); *method != NULL; method++) {
         struct fixture x;
         struct fit_result r;
         setup(&x, FAKE_N_FIT);
@@ -166,7 +167,7 @@ static status fail_numeric(void *context, const struct estimator_call *call, con
 static void test_failing_model(void **state)
 {
     (void)state;
-    for (const struct descent_method *const *method = descent_registry(); *method != NULL; method++) {
+    for (const struct descent_method *const *method = general_methods(); *method != NULL; method++) {
         struct fixture x;
         struct fit_result r;
         struct error err = {0};
