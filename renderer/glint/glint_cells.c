@@ -46,7 +46,7 @@ static void visit(const struct glint_lattice *l, const struct glint_cells *c, ui
 {
     const size_t n_tile2 = c->n_tile * c->n_tile;
     for (size_t k = 0; k < l->n * l->n; k++) {
-        const size_t tile = k / l->n / GLINT_TILE * c->n_tile + k % l->n / GLINT_TILE;
+        const size_t tile = k / (GLINT_TILE * GLINT_TILE);
         int first[2], last[2];
         cells_of(c, l, &l->element[k], first, last);
         for (int t = first[1]; t <= last[1]; t++)

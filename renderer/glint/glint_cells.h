@@ -9,7 +9,7 @@
 
 #include "renderer/glint/glint_element.h"
 
-enum { GLINT_TILE = 16, GLINT_N_CELL = 20 };
+enum { GLINT_N_CELL = 32 };
 
 struct glint_cells {
     float least[2], per_cell[2]; /* cell = (normal - least) * per_cell */

@@ -77,7 +77,8 @@ void glint_draw(const struct glint_lattice *l, const struct glint_query *q, cons
         pick_any(place, c, u, at);
     const float d[2] = {(place[0] - (float)at[0] - 0.5F) * h, (place[1] - (float)at[1] - 0.5F) * h};
     float z[2], covariance[3];
-    glint_query_normal(q, &l->element[(at[1] & mask) * (int64_t)l->n + (at[0] & mask)], d, half, covariance);
+    glint_query_normal(q, &l->element[glint_lattice_index(l, (size_t)(at[0] & mask), (size_t)(at[1] & mask))], d, half,
+                       covariance);
     glint_normal_pair(u + 4, z);
     add_spread(covariance, z, half);
 }

@@ -15,7 +15,7 @@ status glint_lattice_make(const struct glint_option *o, const struct glint_map *
     if (l->element == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make glint elements: out of memory");
     for (size_t k = 0; k < l->n * l->n; k++) {
         const double place[2] = {((double)(k % l->n) + 0.5) * step, ((double)(k / l->n) + 0.5) * step};
-        struct glint_element *e = &l->element[k];
+        struct glint_element *e = &l->element[glint_lattice_index(l, k % l->n, k / l->n)];
         for (int a = 0; a < 2; a++) e->place_um[a] = (float)place[a] * m->texel_um;
         glint_map_at(m, place, e->normal, e->jacobian);
         for (int c = 0; c < 4; c++) e->jacobian[c] = o->is_plain ? 0 : e->jacobian[c] / m->texel_um;

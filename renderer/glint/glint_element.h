@@ -24,13 +24,22 @@ struct glint_element {
     float jacobian[4]; /* d s / d u, d s / d v, d t / d u, d t / d v, for a micrometre */
 };
 
-/* Elements lie on a square lattice of n x n, in rows; element (i, j) is at ((i + 1/2) h, (j + 1/2) h). */
+/* Elements lie on a square lattice of n x n; element (i, j) is at ((i + 1/2) h, (j + 1/2) h). They are stored by tiles,
+ * so that a square of them lies in few pages of memory. */
+enum { GLINT_TILE = 16 };
 struct glint_lattice {
     size_t n;
     float step_um, period_um;
     float variance_h, variance_r; /* sigma_h^2 in um^2, sigma_r^2 */
     struct glint_element *element;
 };
+
+/* Index of element (i, j). */
+static inline size_t glint_lattice_index(const struct glint_lattice *l, size_t i, size_t j)
+{
+    return (j / GLINT_TILE * (l->n / GLINT_TILE) + i / GLINT_TILE) * (GLINT_TILE * GLINT_TILE) +
+           j % GLINT_TILE * GLINT_TILE + i % GLINT_TILE;
+}
 
 /* Standard deviations beyond which a Gaussian counts as 0. */
 #define GLINT_REACH 4.0F

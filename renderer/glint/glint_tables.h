@@ -10,7 +10,7 @@
 #include "renderer/glint/glint_element.h"
 
 /* Elements along an edge of the smallest tiles, least; most nodes along an axis; most levels. */
-enum { GLINT_TABLE_TILE = 32, GLINT_TABLE_NODES = 96, GLINT_TABLE_LEVELS = 6 };
+enum { GLINT_TABLE_TILE = 16, GLINT_TABLE_NODES = 96, GLINT_TABLE_LEVELS = 6 };
 
 struct glint_table_level {
     size_t n_tile;  /* along an edge of the map */

@@ -79,7 +79,7 @@ static void fill_finest(const struct glint_lattice *l, const struct glint_tables
     const float mass = (float)(stride * stride) / (float)(edge * edge);
     for (size_t y = stride / 2; y < l->n; y += stride)
         for (size_t x = stride / 2; x < l->n; x += stride)
-            add_element(t, l, &l->element[y * l->n + x], mass,
+            add_element(t, l, &l->element[glint_lattice_index(l, x, y)], mass,
                         level->density + (y / edge * level->n_tile + x / edge) * n);
 }
 
