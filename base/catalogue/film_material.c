@@ -16,6 +16,8 @@ enum { N_METAL = sizeof metal / sizeof metal[0] };
 
 const char *const film_metal_names[] = {"silver", "gold", "copper", "aluminium", "steel", NULL};
 
+const char *const film_surface_names[] = {"smooth", "noise", "brushed", "scratches", "flakes", NULL};
+
 bool film_metal_color(const char *name, float color[3])
 {
     for (size_t i = 0; i < N_METAL; i++)

@@ -5,13 +5,22 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 /* Films are groups of fibers of their own (fiber_set.h), after those of the kinds of yarn. */
 enum { FILM_MAX_GROUP = 5 };
 
+/* What a camera sees of a film from near: facets one by one (renderer/glint), of the kinds of glint_kind, brushed along
+ * the film; or their mean. */
+enum film_surface { FILM_SMOOTH, FILM_NOISE, FILM_BRUSHED, FILM_SCRATCHES, FILM_FLAKES };
+extern const char *const film_surface_names[]; /* in this order, ended by NULL */
+
 struct film_material {
-    float color[3];  /* reflectance at normal incidence, in (0, 1] */
-    float roughness; /* alpha of the GGX distribution of facets, in (0, 1] */
+    float color[3]; /* reflectance at normal incidence, in (0, 1] */
+    float
+        roughness;  /* alpha of the GGX distribution of facets, in (0, 1]; with glints the slope of their normals too */
+    float grain_um; /* size of waves, flakes or scratches; not of a smooth film */
+    uint32_t surface; /* enum film_surface */
 };
 
 /* The films of a cloth: material k is that of group first_group + k. */

@@ -212,7 +212,9 @@ status render_run(const struct render_request *q, struct thread_pool *pool, cons
     struct run r = {.q = q, .source = &source, .progress = progress, .im = im, .n_pixel = q->width * q->height};
     memset(im, 0, sizeof *im);
     status st = check_request(q, err);
-    if (st == STATUS_OK) st = radiance_source_init(&source, &q->input, q->configuration, 1, err);
+    struct radiance_input in = q->input;
+    in.pixel_m = q->configuration->crop_m / (double)q->width;
+    if (st == STATUS_OK) st = radiance_source_init(&source, &in, q->configuration, 1, err);
     if (st != STATUS_OK) return st;
     r.pixels_per_task = q->n_sample < TASK_SAMPLES ? TASK_SAMPLES / q->n_sample : 1;
     st = render_pixels(&r, pool, err);

@@ -4,6 +4,7 @@
 #include "renderer/scene/scene_ellipse.h"
 #include "renderer/scene/scene_embree.h"
 #include "renderer/scene/scene_ends.h"
+#include "renderer/scene/scene_glint_data.h"
 #include "renderer/scene/scene_grid.h"
 
 #include <math.h>
@@ -265,9 +266,27 @@ static status choose_block(struct scene *s, const struct fiber_set *f, struct er
     return STATUS_OK;
 }
 
+/* What films with glints need. */
+static status add_glints(struct scene *s, struct error *err)
+{
+    if (!scene_has_glints(&s->films)) return STATUS_OK;
+    s->arc_mm = calloc(s->n_vertex, sizeof *s->arc_mm);
+    s->glints = scene_glints_new();
+    if (s->arc_mm == NULL || s->glints == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot build scene: out of memory");
+    for (size_t i = 0; i < s->n_segment; i++) {
+        const size_t v = s->segment_vertex[i];
+        const struct scene_vertex *x = &s->vertex[v];
+        const float d[3] = {x[1].x - x->x, x[1].y - x->y, x[1].z - x->z};
+        s->arc_mm[v + 1] = s->arc_mm[v] + sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    }
+    return STATUS_OK;
+}
+
 status scene_build(struct scene *s, struct error *err)
 {
     status st = scene_ends_new(s, &s->ends, err);
+    if (st == STATUS_OK) st = add_glints(s, err);
     s->number = unique_number();
     if (s->ratio == NULL) return st == STATUS_OK ? scene_grid_new(s, &s->grid, err) : st;
     if (st == STATUS_OK) st = scene_ellipse_fill(s, err);
@@ -328,6 +347,8 @@ void scene_free(struct scene *s)
     free(s->segment_group);
     free(s->long_axis);
     free(s->ratio);
+    free(s->arc_mm);
+    scene_glints_free(s->glints);
     free(s->ellipse);
     scene_ends_free(s->ends);
     scene_grid_free(s->grid);

@@ -21,6 +21,7 @@ enum { SCENE_MAX_HALF_BLOCK = 12 };
 struct bent_cloth;
 struct scene_ellipse;
 struct scene_ends;
+struct scene_glints;
 struct scene_grid;
 
 struct scene_vertex {
@@ -40,6 +41,8 @@ struct scene {
     float *ratio;           /* of each vertex: long over short axis; NULL: surfaces are round tubes */
     bool has_sections, shows_sections; /* of fibers that are no films (scene_ray.h) */
     struct film_groups films;
+    float *arc_mm;                 /* of each vertex from the begin of its fiber; NULL without glints */
+    struct scene_glints *glints;   /* NULL: no film has them (scene_glint.h) */
     struct scene_ellipse *ellipse; /* of each segment, where there are ratios (scene_ellipse.h) */
     struct scene_ends *ends;       /* scene_ends.h */
     struct scene_grid *grid;       /* of round fibers (scene_grid.h) */

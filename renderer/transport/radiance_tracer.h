@@ -44,6 +44,7 @@ struct radiance_input {
     uint64_t speckle_seed;
     uint32_t n_hit;   /* more than 0: paths of surface models end at their n_hit-th hit, with the light that reaches it
                        from the lights: without derivatives, records, or other ways than path tracing */
+    double pixel_m;   /* edge of a pixel of the picture at the orbit center: films show glints; 0: they do not */
     bool plain_paths; /* trace neither guided shadow paths nor to strips of lamps (path_tracer.h): same means, more
                          variance; volumes have none */
 };

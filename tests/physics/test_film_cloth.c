@@ -6,7 +6,8 @@
 #include "geometry/cloth/cloth.h"
 #include "renderer/estimate/derivative_check.h"
 #include "renderer/fast/precompute/fast_precompute.h"
-#include "renderer/scattering/film_facets.h"
+#include "renderer/image/image.h"
+#include "renderer/scattering/film_glint.h"
 #include "renderer/scene/scene_ray.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/estimate_fixture.h"
@@ -23,7 +24,7 @@
 enum { N_PARAM = 9 };
 static const double param[N_PARAM] = {
     0.2, 0.1, 0.3, 0.8, 0.6, 0.4, 6 * RAD_PER_DEG, 14 * RAD_PER_DEG, 20 * RAD_PER_DEG};
-static const struct film_groups sheet_film = {0, 1, {{{0.9f, 0.5f, 0.2f}, 0.3f}}};
+static const struct film_groups sheet_film = {0, 1, {{.color = {0.9f, 0.5f, 0.2f}, .roughness = 0.3f}}};
 
 static struct configuration seen_from(double light_deg, double camera_deg, double camera_phi_deg)
 {
@@ -46,7 +47,7 @@ static struct scene *make_scene(const struct fiber_set *f, const struct film_gro
 }
 
 /* One film along x that is a quarter wider than the tile. */
-static struct scene *sheet(void)
+static struct scene *sheet(const struct film_groups *films)
 {
     static const double y_z[1][2] = {{50e-6, 0}};
     struct fiber_set f;
@@ -56,7 +57,7 @@ static struct scene *sheet(void)
         f.shape[k].ratio = 64;
         f.shape[k].long_axis[1] = 1;
     }
-    struct scene *scene = make_scene(&f, &sheet_film);
+    struct scene *scene = make_scene(&f, films);
     fiber_set_release(&f);
     return scene;
 }
@@ -74,7 +75,7 @@ static void test_sheet(void **state)
     (void)state;
     static const double angle_deg[][3] = {{30, 40, 190}, {60, 55, 215}, {10, 30, 80}, {150, 40, 200}};
     enum { N = sizeof angle_deg / sizeof angle_deg[0] };
-    struct scene *scene = sheet();
+    struct scene *scene = sheet(&sheet_film);
     struct appearance model;
     struct configuration c[N];
     size_t n_path[N];
@@ -106,6 +107,56 @@ static void test_sheet(void **state)
     scene_free(scene);
 }
 
+/* A sheet of flakes has the mean of all normals of its map over many pixels, and single flakes in each pixel. The map
+ * is the scene's (renderer/scene/scene_glint.c). */
+static void test_sheet_of_flakes(void **state)
+{
+    (void)state;
+    enum { N_PX = 128, N = N_PX * N_PX };
+    struct film_groups films = sheet_film;
+    films.material[0].surface = FILM_FLAKES;
+    films.material[0].grain_um = 8;
+    const struct glint_option o = {
+        .kind = GLINT_FLAKES, .seed = 1, .texel_um = 1, .slope = 0.3f, .roughness = 0.01f, .flake_um = 8};
+    struct glint_surface *map = NULL;
+    assert_int_equal(glint_surface_new(&o, &map, NULL), STATUS_OK);
+    struct scene *scene = sheet(&films);
+    struct appearance model;
+    struct configuration c = seen_from(20, 15, 150);
+    c.crop_m = 4e-3;
+    struct image im;
+    const struct render_request q = {.input = trace_input_surface(scene, scattering_find("two_lobe.v1"), param, &model),
+                                     .configuration = &c,
+                                     .width = N_PX,
+                                     .height = N_PX,
+                                     .n_sample = 4,
+                                     .seed = 3};
+    render_fixture_run(&q, 0, &im);
+    double sum = 0, sum2 = 0;
+    for (size_t i = 0; i < N; i++) {
+        const double v = (double)im.pixel[i * im.n_channel];
+        sum += v / N;
+        sum2 += v * v / N;
+    }
+    float wi[3], wo[3], f[3], half[2];
+    double length2 = 0;
+    towards(c.light_theta_rad, c.light_phi_rad, wi);
+    towards(c.camera_theta_rad, c.camera_phi_rad, wo);
+    struct film_glint all = {.surface = map, .at = {.covariance_um2 = {1e8f, 0, 1e8f}}};
+    film_glint_eval(&films.material[0], &all, wi, wo, f);
+    for (int a = 0; a < 3; a++) length2 += (double)(wi[a] + wo[a]) * (double)(wi[a] + wo[a]);
+    for (int a = 0; a < 2; a++) half[a] = (wi[2 * a] + wo[2 * a]) / (float)sqrt(length2);
+    assert_true(glint_density(map, &all.at, half) > 0);
+    const double exact = (double)f[0] * (double)wi[1] * M_PI, sd = sqrt(sum2 - sum * sum), se = sd / N_PX;
+    print_message("flakes: mean %.4f +- %.4f, of the map %.4f, deviation of a pixel %.2f\n", sum, se, exact, sd);
+    /* neighbouring pixels share flakes, by a third of an edge at most: twice the error of independent ones */
+    assert_true(fabs(sum - exact) < 5 * 2 * se && se < 0.02 * exact);
+    assert_true(sd > 0.5 * exact); /* some 15 flakes in a pixel, one of 60 of them bright */
+    image_release(&im);
+    scene_free(scene);
+    glint_surface_free(map);
+}
+
 /* Lame: warps of fibers, every other weft a film alone, the others with a film around them. */
 static void lame(struct fiber_set *f, struct film_groups *films)
 {
@@ -116,8 +167,8 @@ static void lame(struct fiber_set *f, struct film_groups *films)
     d->n_kind = 3;
     d->kind[0].n_fiber = 9;
     d->kind[1] = d->kind[2] = d->kind[0];
-    d->kind[1].film = (struct cloth_film){60, 5, 9000, {{0.95f, 0.7f, 0.3f}, 0.3f}};
-    d->kind[2].film = (struct cloth_film){120, 10, 0, {{0.95f, 0.95f, 0.9f}, 0.2f}};
+    d->kind[1].film = (struct cloth_film){60, 5, 9000, {.color = {0.95f, 0.7f, 0.3f}, .roughness = 0.3f}};
+    d->kind[2].film = (struct cloth_film){120, 10, 0, {.color = {0.95f, 0.95f, 0.9f}, .roughness = 0.2f}};
     d->kind[2].n_fiber = 0;
     d->n_order[CLOTH_WEFT] = 2;
     d->order[CLOTH_WEFT][0] = 1;
@@ -239,7 +290,8 @@ static void test_tables(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest test[] = {cmocka_unit_test(test_sheet), cmocka_unit_test(test_derivatives),
-                                      cmocka_unit_test(test_no_films_same_bits), cmocka_unit_test(test_tables)};
+    const struct CMUnitTest test[] = {cmocka_unit_test(test_sheet), cmocka_unit_test(test_sheet_of_flakes),
+                                      cmocka_unit_test(test_derivatives), cmocka_unit_test(test_no_films_same_bits),
+                                      cmocka_unit_test(test_tables)};
     return cmocka_run_group_tests(test, NULL, NULL);
 }

@@ -176,6 +176,9 @@ static void take_material(const struct job_film *from, struct film_material *m)
     film_metal_color(from->metal, m->color);
     for (int c = 0; c < 3 && !isnan(from->color[0]); c++) m->color[c] = (float)from->color[c];
     m->roughness = (float)from->roughness;
+    m->grain_um = (float)from->grain_um;
+    for (uint32_t k = 0; film_surface_names[k] != NULL; k++)
+        if (strcmp(film_surface_names[k], from->surface) == 0) m->surface = k;
 }
 
 static void take_film(const struct job_film *from, struct cloth_kind *kind)

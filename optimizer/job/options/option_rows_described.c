@@ -25,6 +25,7 @@
     NUMBER_ROW("correction.", name, unit, lower, upper, standard, meaning)
 
 static const char *weave_name(size_t i) { return cloth_weave_names[i]; }
+static const char *surface_name(size_t i) { return film_surface_names[i]; }
 static const char *metal_name(size_t i) { return film_metal_names[i]; }
 
 /* Rows of a film or of sequins, whose paths begin with `where`; `numbers` and `texts` say where values go. */
@@ -47,7 +48,14 @@ static const char *metal_name(size_t i) { return film_metal_names[i]; }
          .left_out = "from the metal",                                                                                 \
          .allowed = "r, g, b",                                                                                         \
          .meaning = "Reflectance at normal incidence, of a lacquered film."},                                          \
-        FILM_NUMBER(where, numbers, roughness, 0.02, 1, NULL, "0.2", "Roughness of the metal: alpha of GGX.")
+        FILM_NUMBER(where, numbers, roughness, 0.02, 1, NULL, "0.2", "Roughness of the metal: alpha of GGX."),         \
+        {.path = where "surface",                                                                                      \
+         .kind = OPTION_WORD,                                                                                          \
+         texts(surface),                                                                                               \
+         .choice_at = surface_name,                                                                                    \
+         .standard = "\"smooth\"",                                                                                     \
+         .meaning = "Facets that glitter one by one in pictures, or their mean (`smooth`)."},                          \
+        FILM_NUMBER(where, numbers, grain_um, 1, 1000, "um", "40", "Size of flakes, waves or scratches that glitter.")
 #define FILM_OF_YARN(member) INTO_OF(struct job_cloth_yarn, film.member)
 #define FILM_TEXT_OF_YARN(member) TEXT_INTO_OF(struct job_cloth_yarn, film.member)
 #define FILM_NUMBERS_OF_YARN(member) NUMBERS_INTO_OF(struct job_cloth_yarn, film.member)

@@ -23,7 +23,9 @@ static inline void path_scatter_look(const struct walk *w, struct bounce *b)
 static inline void path_scatter_sample(const struct walk *w, const struct bounce *b, const float u[3], float wi[3])
 {
     const struct scattering_model *m = w->s->model;
-    if (path_walk_on_film(w))
+    if (path_walk_on_film(w) && b->glint.surface != NULL)
+        film_glint_sample(w->film, &b->glint, b->wo, w->rng, wi);
+    else if (path_walk_on_film(w))
         film_facets_sample(w->film, b->wo, u, wi);
     else if (PATH_PLAIN || m->view_of != NULL)
         m->sample_view(w->state, &b->view, u, wi);
@@ -40,7 +42,7 @@ static inline float path_scatter(const struct walk *w, const struct bounce *b, c
     const struct scattering_model *m = s->model;
     if (path_walk_on_film(w)) {
         if (score != NULL) memset(score, 0, 3 * m->n_param * sizeof *score);
-        return path_film_eval(w->film, wi, b->wo, s_rgb);
+        return path_glint_eval(w->film, &b->glint, wi, b->wo, s_rgb);
     }
     const float pdf = PATH_PLAIN || m->view_of != NULL ? m->eval_pdf_view(w->state, wi, &b->view, s_rgb, score)
                                                        : m->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, score);

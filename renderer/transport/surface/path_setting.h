@@ -29,6 +29,7 @@ struct path_setting {
     bool hides_below;                   /* scene_sheet_hides all directions downwards */
     bool shows_width;     /* the scene has the sections of the fibers as surfaces, and the model states their widths */
     bool has_films;       /* the scene has films: hits ask whether they are on one */
+    float pixel_um;       /* standard deviation of what a pixel sees, across the view; 0: no glints of films */
     float roulette_below; /* throughput under which paths are ended at random; 0: never */
     /* n_traced > 0 ends paths at their n_traced-th hit. Light that arrives there directly from lamps is added as usual;
      * for all other light `finish` returns the radiance in rgb that goes back along the ray. Only for one lamp without
@@ -59,6 +60,10 @@ void path_setting_init(struct path_setting *s, const struct scene *scene, const 
 /* The same with a parameter set per material group. The sets must outlive the setting. */
 void path_setting_init_sets(struct path_setting *s, const struct scene *scene, const struct parameter_sets *sets,
                             const struct configuration *c, bool want_jacobian);
+
+/* path_setting.pixel_um of pixels with this edge. Samples are spread over the pixel, so each sees a part of it: half of
+ * its edge as two standard deviations. */
+static inline float path_setting_pixel_um(double pixel_m) { return (float)(0.25e6 * pixel_m); }
 
 /* To be called last, when all members are set: chooses the walk that is compiled for settings without flat sections,
  * near fields, light across the width, groups, factors, an image, and ends of paths. Settings for which it is not

@@ -3,6 +3,7 @@
 #ifndef SELVEDGE_RENDERER_PATH_STEPS_H
 #define SELVEDGE_RENDERER_PATH_STEPS_H
 
+#include "renderer/scene/scene_glint.h"
 #include "renderer/transport/path_value.h"
 #include "renderer/transport/surface/path_connect.h"
 
@@ -56,6 +57,7 @@ static void bounce_at(struct walk *w, const struct scene_ray *ray, struct bounce
     b->has_speckle = false;
     memcpy(b->offset_mm, ray->offset_mm, sizeof b->offset_mm);
     unwrapped(hit->position_mm, b->offset_mm, b->position_mm);
+    if (!PATH_PLAIN) b->glint.surface = NULL;
     if (!PATH_PLAIN && w->s->has_films) w->film = scene_film(w->s->scene, hit->i_segment);
     const bool flat = !PATH_PLAIN && (w->s->model->flat_section || w->film != NULL);
     float section[3];
@@ -77,6 +79,15 @@ static void bounce_at(struct walk *w, const struct scene_ray *ray, struct bounce
         w->state = w->s->state[w->i_set];
     }
     path_scatter_look(w, b);
+}
+
+/* At the first hit the camera sees the facets of a film one by one. Later hits see their mean: light that a rough
+ * fiber or film has scattered covers many of them. */
+static void see_glints(const struct walk *w, struct bounce *b)
+{
+    float place_um[2];
+    b->glint.surface = scene_glint_at(w->s->scene, &b->hit, b->offset_mm, place_um);
+    if (b->glint.surface != NULL) film_glint_see(&b->glint, place_um, w->s->pixel_um, b->wo);
 }
 
 /* The part of a guided path beyond the present bounce. The walk carries its throughput and scores meanwhile. */
@@ -248,6 +259,7 @@ static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *r
         w->first_out->n_bounce++;
         if (!PATH_PLAIN) w->step = next_step(record);
         bounce_at(w, ray, &b);
+        if (!PATH_PLAIN && i == 0 && w->film != NULL && s->pixel_um > 0 && record == NULL) see_glints(w, &b);
         if (path_factor_wanted(s)) path_factor_note(w, &b, ray);
         if (path_walk_recorded(w)) {
             memcpy(w->step->wo, b.wo, sizeof b.wo);

@@ -2,6 +2,7 @@
 #ifndef SELVEDGE_RENDERER_PATH_WALK_H
 #define SELVEDGE_RENDERER_PATH_WALK_H
 
+#include "renderer/scattering/film_glint.h"
 #include "renderer/scene/fiber_frame.h"
 #include "renderer/transport/surface/path_setting.h"
 
@@ -26,6 +27,7 @@ struct bounce {
     float wo[3];                 /* towards where the path comes from, in the fiber frame */
     float normal[3];             /* of the cloth; only with a discrepancy or speckle */
     struct scattering_view view; /* of wo and the throughput; only if the model has views */
+    struct film_glint glint;     /* only on a film; its surface is NULL where facets are not seen one by one */
     bool has_speckle;            /* this is the first bounce of a walk with speckle */
 };
 

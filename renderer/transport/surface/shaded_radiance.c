@@ -1,4 +1,5 @@
 #include "renderer/transport/surface/shaded_radiance.h"
+#include "renderer/scene/scene_glint.h"
 #include "renderer/transport/camera.h"
 
 #include <stdlib.h>
@@ -51,9 +52,11 @@ status shaded_prepare(const struct shaded_method *m, const struct radiance_input
     st = s->setting != NULL && s->camera != NULL
              ? parameter_sets_init(&s->sets, in->scene.fibers, in->model->surface, in->param, in->n_set, err)
              : error_set(err, STATUS_NO_MEMORY, "cannot render by %s: out of memory", m->name);
+    if (st == STATUS_OK && in->pixel_m > 0) st = scene_glints_make(in->scene.fibers, err);
     for (size_t i = 0; i < n_configuration && st == STATUS_OK; i++) {
         struct path_setting *path = setting_at(s, i);
         path_setting_init_sets(path, in->scene.fibers, &s->sets, &c[i], false);
+        path->pixel_um = path_setting_pixel_um(in->pixel_m);
         if (in->plain_paths) path->guided_paths = path->has_strips = false;
         camera_init(&s->camera[i], &c[i]);
         s->n_setting = i + 1;

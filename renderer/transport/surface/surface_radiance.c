@@ -1,4 +1,5 @@
 #include "renderer/transport/surface/surface_radiance.h"
+#include "renderer/scene/scene_glint.h"
 
 #include "renderer/transport/camera.h"
 #include "renderer/transport/surface/path_order.h"
@@ -45,6 +46,7 @@ static status prepare(const struct radiance_input *in, const struct configuratio
     status st = s->setting != NULL && s->camera != NULL
                     ? parameter_sets_init(&s->sets, s->scene, m, in->param, in->n_set, err)
                     : error_set(err, STATUS_NO_MEMORY, "cannot trace fibers: out of memory");
+    if (st == STATUS_OK && in->pixel_m > 0) st = scene_glints_make(s->scene, err);
     if (st != STATUS_OK) {
         release(s);
         return st;
@@ -55,6 +57,7 @@ static status prepare(const struct radiance_input *in, const struct configuratio
         path_setting_init_sets(&s->setting[i], s->scene, &s->sets, &c[i], in->want_derivative);
         s->setting[i].n_traced = in->n_hit;
         if (in->n_hit == 1) s->setting[i].guided_paths = false;
+        s->setting[i].pixel_um = path_setting_pixel_um(in->pixel_m);
         if (in->plain_paths) s->setting[i].guided_paths = s->setting[i].has_strips = false;
         s->setting[i].discrepancy = in->discrepancy;
         if (in->has_speckle) s->setting[i].speckle = (struct speckle){m->speckle, &s->numbers, in->speckle_seed};

@@ -1,6 +1,6 @@
 /* Facets of metal films: the closed form against the textbook's factors, energy from both sides, samples against their
  * density, reciprocity, derivatives against differences. */
-#include "renderer/scattering/film_facets.h"
+#include "renderer/scattering/film_glint.h"
 
 #include "base/rng.h"
 
@@ -55,7 +55,7 @@ static void test_closed_form(void **state)
     struct rng rng;
     start(&rng, 1);
     for (int k = 0; k < N_PAIR; k++) {
-        const struct film_material m = {{0.9f, 0.6f, 0.3f}, 0.05f + 0.7f * rng_float(&rng)};
+        const struct film_material m = {.color = {0.9f, 0.6f, 0.3f}, .roughness = 0.05f + 0.7f * rng_float(&rng)};
         float wi[3], wo[3], f[3], back[3], below[2][3], g[3];
         direction(&rng, true, wi);
         direction(&rng, true, wo);
@@ -103,7 +103,7 @@ static void test_furnace(void **state)
     for (int r = 0; r < 3; r++)
         for (int side = -1; side <= 1; side += 2)
             for (int deg = 0; deg <= 80; deg += 20) {
-                const struct film_material m = {{1, 1, 1}, roughness[r]};
+                const struct film_material m = {.color = {1, 1, 1}, .roughness = roughness[r]};
                 const double theta = deg * M_PI / 180;
                 const float wo[3] = {(float)(0.6 * sin(theta)), (float)(side * cos(theta)), (float)(0.8 * sin(theta))};
                 double worst;
@@ -122,8 +122,8 @@ static int bin_of(const float w[3])
     return i * N_PHI + j;
 }
 
-/* The density of a bin of the sphere, by midpoints. */
-static double expected(const struct film_material *m, const float wo[3], int bin)
+/* The density of a bin of the sphere, by midpoints. g NULL: of the smooth film. */
+static double expected(const struct film_material *m, const struct film_glint *g, const float wo[3], int bin)
 {
     double sum = 0;
     for (int k = 0; k < N_FINE; k++)
@@ -132,38 +132,72 @@ static double expected(const struct film_material *m, const float wo[3], int bin
                          phi = 2 * M_PI * ((bin % N_PHI + (l + 0.5) / N_FINE) / N_PHI - 0.5), r = sqrt(1 - z * z);
             const float wi[3] = {(float)(r * cos(phi)), (float)z, (float)(r * sin(phi))};
             float f[3];
-            sum += (double)film_facets_eval(m, wi, wo, f, NULL, NULL);
+            sum += (double)(g != NULL ? film_glint_eval(m, g, wi, wo, f) : film_facets_eval(m, wi, wo, f, NULL, NULL));
         }
     return sum * 4 * M_PI / N_BIN / (N_FINE * N_FINE);
 }
 
+/* Samples of a film, smooth (g NULL) or with glints, in bins of the sphere against the density, and the light of a
+ * white furnace. unit_error: of midpoints. */
+static void judge_samples(const struct film_material *m, const struct film_glint *g, const float view[3],
+                          double unit_error)
+{
+    double count[N_BIN] = {0}, chi2 = 0, n_bin = 0, whole = 0, light = 0;
+    float wo[3];
+    struct rng rng;
+    start(&rng, 3);
+    const float length = sqrtf(view[0] * view[0] + view[1] * view[1] + view[2] * view[2]);
+    for (int a = 0; a < 3; a++) wo[a] = view[a] / length;
+    for (int k = 0; k < N_SAMPLE; k++) {
+        float u[2], wi[3], f[3];
+        if (g != NULL) {
+            film_glint_sample(m, g, wo, &rng, wi);
+        } else {
+            for (int a = 0; a < 2; a++) u[a] = rng_float(&rng);
+            film_facets_sample(m, wo, u, wi);
+        }
+        const float pdf = g != NULL ? film_glint_eval(m, g, wi, wo, f) : film_facets_eval(m, wi, wo, f, NULL, NULL);
+        light += (double)f[0] * fabs((double)wi[1]) / (double)pdf / N_SAMPLE;
+        count[bin_of(wi)]++;
+    }
+    for (int b = 0; b < N_BIN; b++) {
+        const double share = expected(m, g, wo, b), n = N_SAMPLE * share;
+        whole += share;
+        if (n < 20) continue;
+        chi2 += (count[b] - n) * (count[b] - n) / (n * (1 + n * unit_error * unit_error));
+        n_bin++;
+    }
+    print_message("whole %.4f, chi2 %.1f of %g bins, light %.4f\n", whole, chi2, n_bin, light);
+    assert_true(fabs(whole - 1) < 2e-3 + unit_error);
+    assert_true(chi2 < n_bin + 5 * sqrt(2 * n_bin) && n_bin > 20); /* five standard deviations */
+    assert_true(light > 0.65 && light < 1.05);                     /* a pixel's facets may lean towards wo */
+}
+
+static const float view[][3] = {{0.1f, 0.9f, 0.42f}, {0.7f, -0.3f, -0.65f}};
+
 static void test_chi_square(void **state)
 {
     (void)state;
-    static const float view[][3] = {{0.1f, 0.9f, 0.42f}, {0.7f, -0.3f, -0.65f}};
-    for (int v = 0; v < 2; v++) {
-        const struct film_material m = {{0.9f, 0.9f, 0.9f}, 0.35f};
-        double count[N_BIN] = {0}, chi2 = 0, n_bin = 0, whole = 0;
-        float wo[3];
-        struct rng rng;
-        start(&rng, 3);
-        const float length = sqrtf(view[v][0] * view[v][0] + view[v][1] * view[v][1] + view[v][2] * view[v][2]);
-        for (int a = 0; a < 3; a++) wo[a] = view[v][a] / length;
-        for (int k = 0; k < N_SAMPLE; k++) {
-            float u[2], wi[3];
-            for (int a = 0; a < 2; a++) u[a] = rng_float(&rng);
-            film_facets_sample(&m, wo, u, wi);
-            count[bin_of(wi)]++;
-        }
-        for (int b = 0; b < N_BIN; b++) {
-            const double share = expected(&m, wo, b), n = N_SAMPLE * share;
-            whole += share;
-            if (n < 20) continue;
-            chi2 += (count[b] - n) * (count[b] - n) / n;
-            n_bin++;
-        }
-        assert_true(fabs(whole - 1) < 2e-3);                           /* midpoints of the largest bins */
-        assert_true(chi2 < n_bin + 5 * sqrt(2 * n_bin) && n_bin > 30); /* five standard deviations */
+    const struct film_material m = {.color = {0.9f, 0.9f, 0.9f}, .roughness = 0.35f};
+    for (int v = 0; v < 2; v++) judge_samples(&m, NULL, view[v], 0);
+}
+
+/* Unresolved normals of .12 are wide enough for the bins' midpoints. */
+static void test_chi_square_of_glints(void **state)
+{
+    (void)state;
+    static const enum glint_kind kind[] = {GLINT_NOISE, GLINT_SCRATCHES, GLINT_FLAKES};
+    const struct film_material m = {.color = {1, 1, 1}, .roughness = 0.2f};
+    for (int k = 0; k < 3; k++) {
+        const struct glint_option o = {
+            .kind = kind[k], .seed = 4, .n_texel = 64, .texel_um = 1, .slope = 0.2f, .roughness = 0.12f};
+        struct film_glint g = {0};
+        struct glint_surface *surface = NULL;
+        assert_int_equal(glint_surface_new(&o, &surface, NULL), STATUS_OK);
+        g.surface = surface;
+        film_glint_see(&g, (const float[2]){20, 30}, 3, view[0]);
+        judge_samples(&m, &g, view[0], 0.01);
+        glint_surface_free(surface);
     }
 }
 
@@ -173,7 +207,7 @@ static void test_derivatives(void **state)
     struct rng rng;
     start(&rng, 4);
     for (int k = 0; k < N_PAIR; k++) {
-        const struct film_material m = {{0.8f, 0.5f, 0.3f}, 0.1f + 0.5f * rng_float(&rng)};
+        const struct film_material m = {.color = {0.8f, 0.5f, 0.3f}, .roughness = 0.1f + 0.5f * rng_float(&rng)};
         struct film_material less = m, more = m;
         float wi[3], wo[3], f[3], low[3], high[3], by_color[3], by_alpha;
         const float step = 0.01f * m.roughness;
@@ -215,7 +249,7 @@ static void test_metals(void **state)
 int main(void)
 {
     const struct CMUnitTest test[] = {cmocka_unit_test(test_closed_form), cmocka_unit_test(test_furnace),
-                                      cmocka_unit_test(test_chi_square), cmocka_unit_test(test_derivatives),
-                                      cmocka_unit_test(test_metals)};
+                                      cmocka_unit_test(test_chi_square),  cmocka_unit_test(test_chi_square_of_glints),
+                                      cmocka_unit_test(test_derivatives), cmocka_unit_test(test_metals)};
     return cmocka_run_group_tests(test, NULL, NULL);
 }
