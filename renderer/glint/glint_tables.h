@@ -9,8 +9,10 @@
 
 #include "renderer/glint/glint_element.h"
 
-/* Elements along an edge of the smallest tiles, least; most nodes along an axis; most levels. */
-enum { GLINT_TABLE_TILE = 16, GLINT_TABLE_NODES = 96, GLINT_TABLE_LEVELS = 6 };
+/* The smallest tiles have at least 16 x 16 elements, and tables at most 96 x 96 nodes. Where the normals spread so far
+ * that these are not fine enough, there are fewer and finer tables: few elements then have the normal of a query.
+ * Levels: at most. */
+enum { GLINT_TABLE_TILE = 16, GLINT_TABLE_NODES = 96, GLINT_TABLE_NODES_WIDE = 160, GLINT_TABLE_LEVELS = 6 };
 
 struct glint_table_level {
     size_t n_tile;  /* along an edge of the map */

@@ -15,8 +15,9 @@ static void covariance_of(const struct glint_lattice *l, const struct glint_elem
     c[2] = l->variance_r + l->variance_h * (j[2] * j[2] + j[3] * j[3]);
 }
 
-/* Nodes from one step below the least normal to one step beyond the largest. */
-static void choose_nodes(const struct glint_lattice *l, struct glint_tables *t)
+/* Nodes from one step below the least normal to one step beyond the largest. Returns whether there are
+ * GLINT_TABLE_NODES_WIDE at most. */
+static bool choose_nodes(const struct glint_lattice *l, struct glint_tables *t)
 {
     float least[2] = {2, 2}, most[2] = {-2, -2};
     for (size_t k = 0; k < l->n * l->n; k++) {
@@ -29,12 +30,15 @@ static void choose_nodes(const struct glint_lattice *l, struct glint_tables *t)
             most[a] = fmaxf(most[a], e->normal[a] + reach);
         }
     }
+    const float sigma = sqrtf(l->variance_r), widest = fmaxf(most[0] - least[0], most[1] - least[1]);
+    const bool is_wide = widest / (GLINT_TABLE_NODES - 4) > 1.25F * sigma;
     for (int a = 0; a < 2; a++) {
         const float range = most[a] - least[a];
-        t->step[a] = fmaxf(sqrtf(l->variance_r), range / (GLINT_TABLE_NODES - 4));
+        t->step[a] = fmaxf(sigma, range / (float)((is_wide ? GLINT_TABLE_NODES_WIDE : GLINT_TABLE_NODES) - 4));
         t->least[a] = least[a] - t->step[a];
         t->n_node[a] = (size_t)ceilf(range / t->step[a]) + 3;
     }
+    return is_wide;
 }
 
 /* First and last node within GLINT_REACH of a mean. */
@@ -49,7 +53,7 @@ static void node_range(const struct glint_tables *t, int axis, float mean, float
 static void add_element(const struct glint_tables *t, const struct glint_lattice *l, const struct glint_element *e,
                         float mass, float *table)
 {
-    enum { MOST = GLINT_TABLE_NODES * GLINT_TABLE_NODES };
+    enum { MOST = GLINT_TABLE_NODES_WIDE * GLINT_TABLE_NODES_WIDE };
     float c[3], value[MOST], sum = 0;
     size_t s[2], r[2], k = 0;
     covariance_of(l, e, c);
@@ -106,9 +110,9 @@ static void sum_rows(const struct glint_tables *t, const struct glint_table_leve
 status glint_tables_make(const struct glint_lattice *l, struct glint_tables *t, struct error *err)
 {
     *t = (struct glint_tables){.period_um = l->period_um};
-    choose_nodes(l, t);
-    size_t edge = GLINT_TABLE_TILE;
-    while (l->n / edge > 1U << (GLINT_TABLE_LEVELS - 1)) edge *= 2;
+    const bool is_wide = choose_nodes(l, t);
+    size_t edge = is_wide ? 2 * GLINT_TABLE_TILE : GLINT_TABLE_TILE;
+    while (l->n / edge > 1U << (GLINT_TABLE_LEVELS - (is_wide ? 2 : 1))) edge *= 2;
     for (size_t n_tile = l->n > edge ? l->n / edge : 1;; n_tile /= 2) {
         struct glint_table_level *level = &t->level[t->n_level++];
         level->n_tile = n_tile;
