@@ -112,9 +112,26 @@ def places_of(cell):
             yield kind, f"{series}.{number}"
 
 
+def source_rows():
+    """Rows of the tables with a place of the source, as lists of cells."""
+    for name in ("source-table.md", "thesis.md"):
+        with open(os.path.join(ROOT, "docs", name)) as page:
+            for table in re.findall(r"^\| place \|.*\n\|[-|]+\n((?:\|.*\n)+)", page.read(), re.MULTILINE):
+                yield from ([cell.strip() for cell in row.strip("|").split("|")] for row in table.splitlines())
+
+
+def test_every_place_has_a_test_or_a_command():
+    rows = list(source_rows())
+    assert len(rows) > 40
+    names = {os.path.splitext(name)[0] for _, _, files in os.walk(os.path.join(ROOT, "tests")) for name in files}
+    for row in rows:
+        shown = re.findall(r"`(?:make )?([\w-]+)[^`]*`", row[-1])
+        assert shown, row
+        assert not [name for name in shown if name.startswith("test_") and name not in names], row
+
+
 def test_source_table_has_every_place():
-    with open(os.path.join(ROOT, "docs", "source-table.md")) as page:
-        found = {place for row in re.findall(r"^\| ([^|]+) \|", page.read(), re.MULTILINE) for place in places_of(row)}
+    found = {place for row in source_rows() for place in places_of(row[0])}
     wanted = {("", f"{series}.{number}") for series, most in SOURCE_SECTIONS.items() for number in range(1, most + 1)}
     for kind, chapters in SOURCE_NUMBERS.items():
         wanted |= {(kind, f"{chapter}.{number}") for chapter, most in chapters.items() for number in range(1, most + 1)}

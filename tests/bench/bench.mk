@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports exports-side-by-side bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-glints bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics gallery docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-sheared bench-weave bench-weave-rendered
+.PHONY: bench bench-thesis bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports exports-side-by-side bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-glints bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics gallery docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-sheared bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 $(BUILD)/tests/bench/models/bench_waves: LINK_TEST := $(LINK_WAVE)
 # bench_fit is more than one file
@@ -53,6 +53,11 @@ bench-recovery: | deps-test ## whether a fit of each surface model finds its own
 bench-model-tables: | deps-test ## all models fitted to the measured tables, on one cloth (40 minutes on 2 quiet cores; jobs are kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/models/bench_model_tables.py --build $(BUILD) $(if $(TABLES),--tables $(TABLES)) $(FABRICS)
+
+# THESIS: beginnings of names of steps, such as THESIS="fit.silk cross.silk": only these are made. What is finished is kept in build/bench-thesis
+bench-thesis: | deps-test ## chapters 5 and 6 of the fabric thesis: six fabrics by three models, cylinders, drapes, steps left out; writes docs/thesis.md (two hours on 2 quiet cores; continues when stopped)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/thesis/bench_thesis.py --build $(BUILD) --page docs/thesis.md $(THESIS)
 
 # PICTURES: some of the fabrics only, and options of the program, such as PICTURES="silk --px 256"
 bench-pictures: | deps-test ## the fast renderer against path tracing on three fabrics (half an hour on 2 quiet cores)

@@ -1,0 +1,45 @@
+"""Configurations, parameters and the error of make bench-thesis (tests/bench/thesis)."""
+import json
+import os
+import random
+import subprocess
+import sys
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+BUILD = os.environ.get("SELVEDGE_BUILD", os.path.join(ROOT, "build"))
+sys.path.insert(0, os.path.join(ROOT, "tests", "bench", "thesis"))
+import thesis_fabrics  # noqa: E402
+import thesis_fits  # noqa: E402
+
+
+def test_configurations_are_as_many_as_printed():
+    assert len(set(thesis_fabrics.FITTED)) == 16 and len(set(thesis_fabrics.FURTHER)) == 492
+    assert sum(row in thesis_fabrics.GRAZING for row in thesis_fabrics.FITTED) == 2
+    elevations = [{light for light, *_ in thesis_fabrics.FITTED[4 * row:4 * row + 4]} for row in range(4)]
+    assert 80 in elevations[0] and 80 not in elevations[3] and 64 in elevations[3]
+
+
+def test_table_lies_in_the_ranges():
+    """54 sets of Table 5.3: colors count as three."""
+    said = subprocess.run([os.path.join(BUILD, "bin", "selvedge-worker"), "--catalogue"], check=True, capture_output=True, text=True)
+    models = {m["id"]: {p["name"]: p for p in m["parameters"]} for m in json.loads(said.stdout)["models"]}
+    for model, model_id in thesis_fabrics.MODELS.items():
+        known = models[model_id]
+        for fabric in thesis_fabrics.NAMES:
+            values = thesis_fits.flat(thesis_fabrics.truth(fabric, model))
+            assert set(known) - set(values) <= {"density_multiplier"}
+            for name, value in values.items():
+                assert known[name]["lower"] - 1e-9 <= value <= known[name]["upper"] + 1e-9, (fabric, model, name)
+
+
+def test_error_has_no_bias_by_noise():
+    """Rows that are off by 10 %, with noise of 20 % in both: the mean of 200 draws lies within four standard errors."""
+    draw = random.Random(5)
+    squares = []
+    for _ in range(200):
+        rows = [{"set": "held-out", "measured": [0.5 + draw.gauss(0, 0.1) for _ in range(3)], "measured_se": [0.1] * 3,
+                 "rendered": [0.55 + draw.gauss(0, 0.1) for _ in range(3)], "rendered_se": [0.1] * 3} for _ in range(40)]
+        squares.append(sum(thesis_fits.row_square(row) * thesis_fits.brightness(row["measured"]) ** 2 / 0.25 for row in rows) / len(rows))
+    mean = sum(squares) / len(squares)
+    se = (sum((s - mean) ** 2 for s in squares) / len(squares) / (len(squares) - 1)) ** 0.5
+    assert abs(mean - 0.01) < 4 * se and se < 0.005

@@ -1,0 +1,84 @@
+"""Steps of bench_thesis.py that are jobs: each is a document and files, run by the worker in a folder of its own. A step that is finished is
+one JSON file beside the folder, and is taken from there as long as its document and files are the same; a folder that was
+interrupted goes on where it stopped, as every job does.
+"""
+import hashlib
+import json
+import os
+import resource
+import shutil
+import subprocess
+import sys
+import time
+
+
+class Steps:
+    def __init__(self, build, folder, names):
+        self.worker = os.path.join(build, "bin", "selvedge-worker")
+        self.build, self.folder, self.names = build, folder, names
+        os.makedirs(folder, exist_ok=True)
+
+    def wanted(self, name):
+        return not self.names or any(name.startswith(n) for n in self.names)
+
+    def kept(self, name):
+        """What is known of a step, or None."""
+        path = os.path.join(self.folder, name + ".json")
+        if not os.path.exists(path):
+            return None
+        with open(path, encoding="utf-8") as f:
+            return json.load(f)
+
+    def keep(self, name, value):
+        path = os.path.join(self.folder, name + ".json")
+        with open(path + ".new", "w", encoding="utf-8") as f:
+            json.dump(value, f)
+        os.replace(path + ".new", path)
+        return value
+
+    def step(self, name, key, make):
+        """make() gives what is kept under the name; key: of what it depends on. None where the step is not wanted and not there."""
+        there = self.kept(name)
+        mark = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()
+        if there is not None and (there["key"] == mark or not self.wanted(name)):
+            return there["value"]
+        if not self.wanted(name):
+            return None
+        before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
+        value = make()
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        print(f"{name}: processor {cpu_s:.1f} s, {time.monotonic() - start:.0f} s", file=sys.stderr, flush=True)
+        return self.keep(name, {"key": mark, "cpu_s": round(cpu_s, 1), "value": value})["value"]
+
+    def job(self, name, document, files, take):
+        """take(result, folder of the results) gives what is kept."""
+        return self.step(name, [document, files], lambda: self.run(name, document, files, take))
+
+    def run(self, name, document, files, take):
+        """files: the content of each, or the path of one that is copied."""
+        folder = os.path.join(self.folder, name)
+        text = json.dumps([document, files], sort_keys=True)
+        recipe = os.path.join(folder, "recipe.json")
+        if os.path.exists(recipe):
+            with open(recipe, encoding="utf-8") as f:
+                if f.read() != text:
+                    shutil.rmtree(folder)
+        os.makedirs(os.path.join(folder, "input"), exist_ok=True)
+        for file, content in files.items():
+            if len(content) < 4096 and os.path.exists(content):
+                shutil.copy(content, os.path.join(folder, "input", file))
+                continue
+            with open(os.path.join(folder, "input", file), "w", encoding="utf-8") as f:
+                f.write(content)
+        for path, content in ((os.path.join(folder, "job.json"), json.dumps(document)), (recipe, text)):
+            with open(path, "w", encoding="utf-8") as f:
+                f.write(content)
+        if subprocess.run([self.worker, "--quiet", folder], check=False).returncode != 0:
+            with open(os.path.join(folder, "log.txt"), encoding="utf-8") as f:
+                raise RuntimeError(f"{name}: {f.read()[-1500:]}")
+        results = os.path.join(folder, "results")
+        with open(os.path.join(results, "result.json"), encoding="utf-8") as f:
+            value = take(json.load(f), results)
+        shutil.rmtree(os.path.join(results, "renderings"), ignore_errors=True)
+        return value

@@ -1,0 +1,185 @@
+"""Writes the page of bench_thesis.py: page.txt with a value in place of each {name}."""
+import datetime
+import json
+import math
+import os
+import re
+
+from thesis_fabrics import MODELS, NAMES
+from thesis_pictures import ANGLES, CELL_PATHS, CHAIN, ORDERS, SIDE
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+
+MISSING = "-"
+SHOWN = ("fleece", "gabardine", "silk")
+
+
+def digits(value):
+    return f"{value:.3f}" if value < 0.0995 else f"{value:.2f}"
+
+
+def span(values, form="{:.2f}"):
+    values = list(values)
+    return MISSING if not values else f"{form.format(min(values))} to {form.format(max(values))}" if len(values) > 1 else form.format(values[0])
+
+
+def listed(values, form="{:.2f}"):
+    return ", ".join(MISSING if v is None else form.format(v) for v in values)
+
+
+def with_ratio(fit):
+    """Smaller than the noise of tracing: with <."""
+    return MISSING if fit is None else f"{'< ' if fit['below_noise'] else ''}{digits(fit['heldout'])} ({digits(fit['ratio'])})"
+
+
+def fits(found):
+    lines = ["| | fibers | volume | microflakes | volume on fibers | microflakes on fibers | plain BRDF |", "|---|---|---|---|---|---|---|"]
+    for fabric in NAMES:
+        own = [with_ratio(found[fabric, model]) for model in MODELS]
+        cross = [with_ratio(found[fabric, model, "cross"]) for model in ("volume", "microflake")]
+        fibers = found[fabric, "two_lobe"]
+        lines.append(f"| {fabric.capitalize()} | {' | '.join(own + cross)} | {digits(fibers['brdf']) if fibers else MISSING} |")
+    return "\n".join(lines)
+
+
+def brightness(columns):
+    return sum(sum(bin_[:3]) for bin_ in columns)
+
+
+def over_true(found, fabric, model):
+    """Mean radiances over the true ones: five cylinders, then the two drapes with the black mesh."""
+    shown, true = found["shapes", fabric, model], found["shapes", fabric, "photograph"]
+    if shown is None or true is None:
+        return [None] * (len(ANGLES) + len(SIDE))
+    return ([brightness(a) / brightness(b) for a, b in zip(shown["columns"], true["columns"])]
+            + [a / b for a, b in zip(shown["drapes"][:2], true["drapes"][:2])])
+
+
+def grazing(found):
+    head = [f"{a}°" for a in ANGLES] + ["drape, same side", "opposite"]
+    lines = [f"| | grazing | {' | '.join(head)} |", "|---|" + "---|" * (len(head) + 1)]
+    for fabric in NAMES:
+        for model, name in (("volume", "volume"), ("microflake", "microflakes")):
+            cross = found[fabric, model, "cross"]
+            row = [sum(cross["grazing"]) / 2 if cross else None] + over_true(found, fabric, model)
+            lines.append(f"| {fabric.capitalize()}, {name} | " + " | ".join(MISSING if v is None else f"{v:.2f}" for v in row) + " |")
+    return "\n".join(lines)
+
+
+def correlation(xs, ys):
+    mx, my = sum(xs) / len(xs), sum(ys) / len(ys)
+    sxy = sum((x - mx) * (y - my) for x, y in zip(xs, ys))
+    return sxy / math.sqrt(sum((x - mx) ** 2 for x in xs) * sum((y - my) ** 2 for y in ys))
+
+
+def column_correlations(found, model):
+    for fabric in NAMES:
+        shown, true = found["shapes", fabric, model], found["shapes", fabric, "photograph"]
+        if shown and true:
+            both = [[sum(bin_[:3]) for table in of["columns"] for bin_ in table] for of in (shown, true)]
+            yield correlation(*both)
+
+
+def recovered(found):
+    """(determined parameters within two standard errors of the truth, determined parameters, names and models of the others)."""
+    inside, counted, others = 0, 0, {}
+    for model in MODELS:
+        for fit in (found[fabric, model] for fabric in NAMES if found[fabric, model]):
+            for name, value, se, determined in fit["parameters"]:
+                counted += determined
+                inside += determined and abs(value - fit["truth"][name]) <= 2 * se
+                if determined and abs(value - fit["truth"][name]) > 2 * se:
+                    others.setdefault(f"{name.split('.')[0]} of {model}", 0)
+                    others[f"{name.split('.')[0]} of {model}"] += 1
+    return inside, counted, ", ".join(f"{n} {what}" for what, n in others.items())
+
+
+def gammas(found):
+    values = {fabric: dict((p[0], p[1]) for p in found[fabric, "microflake"]["parameters"])["gamma"] for fabric in NAMES if found[fabric, "microflake"]}
+    return f"{span([v for f, v in values.items() if f != 'velvet'], '{:.4f}')} and {values.get('velvet', math.nan):.4f}"
+
+
+def meshes(found):
+    parts = []
+    for fabric in ("gabardine", "twill"):
+        drapes = (found["shapes", fabric, "photograph"] or {}).get("drapes")
+        text = listed([a / b for a, b in zip(drapes[2:], drapes[:2])]) if drapes else MISSING
+        parts.append(f"{fabric.capitalize()} {text}")
+    return "; ".join(parts) + " times (same side, opposite)"
+
+
+def highlight(found, name):
+    """Brightest part of the columns under the lamp at 126 degrees over their mean under the lamp at 10, over the default's."""
+    def of(step):
+        return max(sum(b[:3]) for b in step["columns"][3]) / (brightness(step["columns"][0]) / len(step["columns"][0]))
+    step, default = found["chain", name], found["chain", "default"]
+    return f"{of(step) / of(default):.2f}" if step and default else MISSING
+
+
+def difference(step, other):
+    """Root mean square over fields, over the mean."""
+    pairs = [(a, b) for f, g in zip(step["fields"], other["fields"]) for a, b in zip(f, g)]
+    return math.sqrt(sum((a - b) ** 2 for a, b in pairs) / len(pairs)) / (sum(b for _, b in pairs) / len(pairs))
+
+
+def fast(found):
+    path, last = found["fast", "path"], found["fast", f"order-{ORDERS[-1]}"]
+
+    def over_path(name):
+        step = found["fast", name]
+        return step["mean"] / path["mean"] if step and path else None
+    orders = [found["fast", f"order-{o}"] for o in ORDERS[:-1]]
+    return {"sizes": ", ".join(f"{e:g}" for e in CELL_PATHS), "size_means": listed([over_path(f"size-{e}") for e in CELL_PATHS], "{:.3f}"),
+            "orders": f"{ORDERS[0]} to {ORDERS[-2]}", "order_differences": listed([difference(s, last) if s and last else None for s in orders], "{:.3f}"),
+            "dual": listed([over_path("dual")]), "directions": listed([over_path("directions")])}
+
+
+def kept_figures():
+    with open(os.path.join(HERE, "..", "figures.jsonl"), encoding="utf-8") as f:
+        rows = {row["name"]: row["value"] for row in map(json.loads, f)}
+
+    def of(what, form):
+        return ", ".join(form.format(rows[f"pictures.{fabric}.{what}"]) if f"pictures.{fabric}.{what}" in rows else MISSING for fabric in SHOWN)
+    return {"flat": of("flat492_rel_rms", "{:.3f}"), "speeds": of("speedup_at_equal_noise", "{:.1f}")}
+
+
+def stripe(found, what):
+    new, old = found["stripes", "alternative"], found["stripes", "fitted"]
+    return f"{new[what] / old[what]:.2f}" if new and old else MISSING
+
+
+def machine():
+    with open("/proc/cpuinfo", encoding="utf-8") as f:
+        name = re.search(r"model name\s*: (.*)", f.read())
+    return f"{datetime.date.today().isoformat()}, {os.cpu_count()} cores of {'an ' + name[1].split('(')[0] if name else 'a processor'} beside other work."
+
+
+def values(found):
+    inside, counted, others = recovered(found)
+    own = [found[fabric, model] for fabric in NAMES for model in MODELS if found[fabric, model]]
+    cross = {m: [found[f, m, "cross"] for f in NAMES if found[f, m, "cross"]] for m in ("volume", "microflake")}
+    text = {"fits": fits(found), "grazing": grazing(found), "within": inside, "counted": counted, "others": others,
+            "gamma": gammas(found), "mesh": meshes(found),
+            "fit_cpu": f"{sum(f['cpu_s'] for f in own) / max(1, len(own)):.0f}",
+            "density": listed([d and d["heldout"] for d in (found["density", d] for d in (4000, 2000, 1000))], "{:.3f}"),
+            "contrast": stripe(found, "contrast"), "stripes_mean": stripe(found, "mean"), "machine": machine(),
+            "scatter_two_lobe": span([found[f, "two_lobe"]["of_rows"][0] for f in NAMES if found[f, "two_lobe"]], "{:.3f}"),
+            "grazing_range": span([v for fit in cross["microflake"] for v in fit["grazing"]])}
+    for model, of in cross.items():
+        text[f"scatter_{model}"] = span([fit["of_rows"][0] for fit in of], "{:.3f}")
+        text[f"columns_{model}"] = span(column_correlations(found, model))
+    by_moments = [found[fabric, "bisected"] for fabric in NAMES if found[fabric, "bisected"]]
+    text["bisected"] = span([fit["heldout"] for fit in by_moments])
+    text["bisected_gamma"] = span([p[1] for fit in by_moments for p in fit["parameters"] if p[0] == "gamma"], "{:.3f}")
+    text["missing"] = f" {MISSING}: not run." if any(v is None for v in found.values()) else ""
+    text.update({name: highlight(found, name) for name in CHAIN})
+    return {**text, **fast(found), **kept_figures()}
+
+
+def write_page(found, path):
+    with open(os.path.join(HERE, "page.txt"), encoding="utf-8") as f:
+        page = f.read()
+    of = values(found)
+    page = re.sub(r"\{([a-z_]+)\}", lambda m: str(of[m[1]]), page)
+    with open(path, "w", encoding="utf-8") as f:
+        f.write(page)
