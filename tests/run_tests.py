@@ -27,7 +27,7 @@ SLOW_CHECKS = ["clang", "tsan-requests"]
 # unit tests that take more than 4 s of a core, which the inner loop leaves to `make test`
 LONG_UNIT_TESTS = ["unit/renderer/scattering/test_scattering", "unit/renderer/fast/test_precompute_journal", "unit/renderer/preview/test_joint_filter",
                    "unit/renderer/quick/test_dual_scattering", "unit/geometry/diameter/test_lumen_fill", "unit/geometry/reconstruct/test_lumen_refill",
-                   "unit/renderer/fast/test_deep_light",
+                   "unit/renderer/fast/test_deep_light", "unit/renderer/glint/test_glint_surface",
                    "unit/renderer/mesh/test_drape", "unit/renderer/fast/test_fast_tables", "unit/geometry/fibers/test_shape_measure",
                    "unit/geometry/weave/test_weave_detect", "unit/renderer/preview/test_sheared_filter", "unit/optimizer/report/test_hair_fit",
                    "unit/geometry/volume/test_slice_tiles", "unit/renderer/fast/test_gaussian_light", "unit/geometry/orientation/test_alignment",
