@@ -103,7 +103,7 @@ clean:             ## remove build/
 	rm -rf build
 
 help:              ## list the targets
-	@awk -F ':[^#]*## ' '/^##@ /{printf "\n%s\n", substr($$0, 5)} /^[a-z-]+:.*## /{printf "  %-18s %s\n", $$1, $$2}' \
+	@awk -F ':[^#]*## ' '/^##@ /{printf "\n%s\n", substr($$0, 5)} /^[a-z0-9-]+:.*## /{printf "  %-18s %s\n", $$1, $$2}' \
 		$(MAKEFILE_LIST)
 
 # tables whose rows stand beside the code that they are about: the file, the macro of a row, the sources. A row ends at a blank

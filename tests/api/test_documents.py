@@ -46,7 +46,7 @@ def makefiles():
 
 
 def make_targets():
-    return {name for names in re.findall(r"^([a-z][a-z -]*):(?!=)", makefiles(), re.MULTILINE) for name in names.split()}
+    return {name for names in re.findall(r"^([a-z][a-z0-9 -]*):(?!=)", makefiles(), re.MULTILINE) for name in names.split()}
 
 
 def test_links_lead_somewhere():
@@ -75,7 +75,7 @@ def test_make_targets_exist():
     targets = make_targets()
     assert "all" in targets and "test" in targets
     missing = [f"{path}: make {name}" for path, text in texts()
-               for name in re.findall(r"(?:`|^    )make ([a-z][a-z-]*)", text, re.MULTILINE) if name not in targets]
+               for name in re.findall(r"(?:`|^    )make ([a-z][a-z0-9-]*)", text, re.MULTILINE) if name not in targets]
     assert not missing
 
 

@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-thesis bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports exports-side-by-side bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-glints bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics gallery docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-sheared bench-weave bench-weave-rendered
+.PHONY: bench bench-thesis bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports exports-side-by-side bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-chapter4 bench-glints bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics gallery docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-sheared bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 $(BUILD)/tests/bench/models/bench_waves: LINK_TEST := $(LINK_WAVE)
 # bench_fit is more than one file
@@ -43,6 +43,10 @@ GLINT_BENCHES := $(filter $(BUILD)/tests/bench/glints/%,$(BENCH_BINS))
 bench-glints: | deps-test ## glints of metal: accuracy and speed, by geometric and by wave optics (a minute)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(GLINT_BENCHES) >&2
 	@for b in $(GLINT_BENCHES); do $$b || exit 1; done
+# FIBERS: the first so many of the 14
+bench-chapter4: | deps-test ## the ratio of the axes and the turn of simulated hair fibers, from R or TRT alone and from all modes (a quarter of an hour on 2 quiet cores)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/models/bench_chapter4 >&2
+	@$(BUILD)/tests/bench/models/bench_chapter4 $(FIBERS)
 
 # MODELS: as above
 bench-recovery: | deps-test ## whether a fit of each surface model finds its own parameters again (an hour on 2 quiet cores; photographs are kept in build)

@@ -50,7 +50,7 @@ def bench_programs(build):
     for name in sorted(os.listdir(folder)) if os.path.isdir(folder) else []:
         if name.startswith("bench_"):
             subprocess.run([os.path.join(folder, name)], check=True)
-    for name in ("bench_models", "bench_profiles", "bench_waves"):
+    for name in ("bench_models", "bench_profiles", "bench_chapter4", "bench_waves"):
         subprocess.run([os.path.join(folder, "models", name)], check=True)
 
 

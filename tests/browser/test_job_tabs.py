@@ -233,6 +233,30 @@ def test_a_profile_has_its_plot(fitted, browser, tmp_path):
     assert f"{100 * error:.2f} %" in text_of(browser, "#key-numbers") and complaints(browser) == []
 
 
+def test_maps_of_a_turned_fiber(fitted, browser, tmp_path):
+    """A profile with azimuths of the light: maps of measured beside fitted in one scale, and the turn of the section."""
+    lines = [f"{phi_i},{theta},{phi},{(1 + 0.2 * math.cos(2 * math.radians(phi_i - 50))) * math.exp(-(((theta - 40) / 9) ** 2)):.6g}"
+             for phi_i in range(0, 360, 30) for theta in range(30, 51, 5) for phi in range(0, 360, 20)]
+    (tmp_path / "fiber.csv").write_text("phi_i_deg,theta_o_deg,phi_deg,radiance\n" + "\n".join(lines) + "\n")
+    document = {"sample": "ribbon", "profile": {"file": "fiber.csv", "theta_i_deg": -40}, "fit": {"models": ["textile.v3"]}}
+    url = fitted[0]
+    job = selvedge.Client(url).submit(document, str(tmp_path))
+    assert job.wait().state == "succeeded"
+    browser.get(f"{url}/#{job.id}/parameters")
+    wait_for(browser, "document.querySelectorAll('#profile-plot svg.map').length === 2")
+    labels = browser.execute_script("return [...document.querySelectorAll('#profile-plot svg[aria-label]')].map((s) => s.getAttribute('aria-label'))")
+    assert labels[0].startswith("measured, light θi -40°, view θo 40°") and labels[1].startswith("fitted, textile.v3")
+    assert labels[2].startswith("colour scale from 0 to 1.")
+    assert browser.execute_script("return document.querySelectorAll('#profile-plot svg.map path').length") > 10, "cells of many colours"
+    keep(browser, "profile-maps")
+    shown = {"theta-phi": "svg.map').length === 2", "polar": "svg.polar polygon').length === 6", "curves": "svg.plot polyline').length === 6"}
+    for view, condition in shown.items():
+        browser.execute_script(f"document.querySelector('#profile-plot button[data-view=\"{view}\"]').click()")
+        wait_for(browser, f"document.querySelectorAll('#profile-plot {condition}")
+        keep(browser, f"profile-{view}")
+    assert "Turn of the section" in text_of(browser, "#profile-models") and complaints(browser) == []
+
+
 def test_kinds_of_fibers(fitted, browser, tmp_path):
     scan = os.path.join(os.environ.get("SELVEDGE_DATA") or os.path.join(ROOT, "..", "shared", "data"), "unseen-scans", "two-densities.tif")
     if not os.path.exists(scan):

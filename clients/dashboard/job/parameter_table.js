@@ -33,8 +33,9 @@ export function modelTable(list, choice) {
 
 // The models of a job with the profile of a single fiber.
 export function profileModels(list) {
+  const turned = list.some((m) => isNumber(m.turn_deg)), turn = (m) => (isNumber(m.turn_deg) ? `${withError(m.turn_deg, m.turn_se_deg || undefined)}°${m.turn_determined ? "" : " (not determined)"}` : "–");
   const rows = list.map((m) => el("tr", { class: m.best ? "best" : "" }, el("td", { title: m.title }, el("span", { class: "mono" }, m.id)), el("td", { class: "number" }, percentWithError(m.nrmse)),
-    el("td", { class: "number" }, percentWithError(m.rel_rms)), el("td", { class: "number" }, withError(m.scale, m.scale_se || undefined)), el("td", { class: "number" }, duration(m.fit_wall_s)),
+    el("td", { class: "number" }, percentWithError(m.rel_rms)), el("td", { class: "number" }, withError(m.scale, m.scale_se || undefined)), turned ? el("td", { class: "number" }, turn(m)) : null, el("td", { class: "number" }, duration(m.fit_wall_s)),
     el("td", {}, m.best ? el("span", { class: "tag good" }, "best") : null, m.converged ? null : el("span", { class: "tag warn" }, "not converged"))));
-  return wide("models of the profile", el("table", { id: "profile-models" }, heads("Model", "#Error, of the range", "#Relative error", "#Scale", "#Time", "Remarks"), el("tbody", {}, rows)));
+  return wide("models of the profile", el("table", { id: "profile-models" }, heads("Model", "#Error, of the range", "#Relative error", "#Scale", ...(turned ? ["#Turn of the section"] : []), "#Time", "Remarks"), el("tbody", {}, rows)));
 }

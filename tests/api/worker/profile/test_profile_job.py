@@ -192,7 +192,8 @@ def test_tables_that_are_refused(tmp_path, text, says):
     ({**DOCUMENT, "fit": {"method": "published_sgd.v1"}}, "fit.method"),
     ({**DOCUMENT, "fibers": {"file": "a.hair"}}, "fibers"), ({**DOCUMENT, "black_sheet": True}, "black_sheet"),
     ({**DOCUMENT, "fit": {"model": "microflake.v1"}}, "fit.models"), ({**DOCUMENT, "fit": {"path_budget": 5000}}, "fit.path_budget"),
-    ({**DOCUMENT, "profile": {"file": "a.csv", "mode": "E"}}, "profile.mode"), ({**DOCUMENT, "profile": {"file": "a.csv", "theta_i_deg": 95}}, "profile.theta_i_deg"), ({**DOCUMENT, "profile": {}}, "profile.file"),
+    ({**DOCUMENT, "profile": {"file": "a.csv", "mode": "E"}}, "profile.mode"),
+    ({**DOCUMENT, "profile": {"file": "a.csv", "theta_i_deg": 95}}, "profile.theta_i_deg"), ({**DOCUMENT, "profile": {}}, "profile.file"),
     ({**DOCUMENT, "fit": {"fixed": {"C_R": 0.1, "C_TT": 0.5}, "model": "two_lobe.v1", "bounds": {"beta_R": [9, 3]}}}, "fit.bounds.beta_R"),
 ])
 def test_documents_that_are_refused(real, document, field):
