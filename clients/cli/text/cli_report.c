@@ -255,6 +255,10 @@ static void print_profile(const json_t *profile, FILE *out)
         fprintf(out, "  %-22s %10s %10s %14.5g %8s  %s%s\n", id, range, relative, member_number(m, "scale"), time,
                 json_is_true(json_object_get(m, "best")) ? "best " : "",
                 json_is_false(json_object_get(m, "converged")) ? "not converged" : "");
+        if (json_is_number(json_object_get(m, "turn_deg")))
+            fprintf(out, "    section turned by %.4g degrees, error %.2g%s\n", member_number(m, "turn_deg"),
+                    member_number(m, "turn_se_deg"),
+                    json_is_false(json_object_get(m, "turn_determined")) ? ": not determined" : "");
     }
 }
 

@@ -93,6 +93,8 @@ def test_azimuths_of_the_light(real):
     assert lines[0] == "theta_i_deg,phi_i_deg,theta_o_deg,phi_deg,channel,radiance,textile.v3,isotropic.v1" and len(lines) == 145
     page, summary = (real.get(f"/v1/jobs/{job}/results/{name}").text for name in ("report.html", "summary.txt"))
     assert "phi_i 330" in page and "turn of the section" in page and "turn " in summary
+    done = subprocess.run([program("selvedge"), "watch", job, "--server", real.url], capture_output=True, text=True, timeout=60)
+    assert "section turned by" in done.stdout, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("profile,field,says", [
