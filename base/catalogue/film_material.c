@@ -18,6 +18,8 @@ const char *const film_metal_names[] = {"silver", "gold", "copper", "aluminium",
 
 const char *const film_surface_names[] = {"smooth", "noise", "brushed", "scratches", "flakes", NULL};
 
+const char *const film_optics_names[] = {"rays", "ohs", "ghs", "r_ohs", "r_ghs", "kirchhoff", NULL};
+
 bool film_metal_color(const char *name, float color[3])
 {
     for (size_t i = 0; i < N_METAL; i++)

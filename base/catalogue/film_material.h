@@ -15,13 +15,25 @@ enum { FILM_MAX_GROUP = 5 };
 enum film_surface { FILM_SMOOTH, FILM_NOISE, FILM_BRUSHED, FILM_SCRATCHES, FILM_FLAKES };
 extern const char *const film_surface_names[]; /* in this order, ended by NULL */
 
+/* How light is reflected there: by geometric optics, or as waves by one of five diffraction models
+ * (renderer/glint/wave_diffraction.h), which noise, brushed films and scratches have. */
+enum film_optics { FILM_RAYS, FILM_OHS, FILM_GHS, FILM_R_OHS, FILM_R_GHS, FILM_KIRCHHOFF };
+extern const char *const film_optics_names[]; /* in this order, ended by NULL */
+
 struct film_material {
     float color[3]; /* reflectance at normal incidence, in (0, 1] */
     float
         roughness;  /* alpha of the GGX distribution of facets, in (0, 1]; with glints the slope of their normals too */
     float grain_um; /* size of waves, flakes or scratches; not of a smooth film */
     uint32_t surface; /* enum film_surface */
+    uint32_t optics;  /* enum film_optics */
 };
+
+/* Whether light is reflected as waves. */
+static inline bool film_has_waves(const struct film_material *m)
+{
+    return m->optics != FILM_RAYS && m->surface != FILM_SMOOTH && m->surface != FILM_FLAKES;
+}
 
 /* The films of a cloth: material k is that of group first_group + k. */
 struct film_groups {

@@ -16,6 +16,30 @@ void film_glint_see(struct film_glint *g, const float center_um[2], float pixel_
     g->at.covariance_um2[2] = p2 + longer * wo[2] * wo[2];
 }
 
+/* Takes white out of a color until no channel is below 0; its luminance stays (Rec. 709). */
+static void into_gamut(float rgb[3])
+{
+    const float white = 0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2];
+    const float least = fminf(fminf(rgb[0], rgb[1]), rgb[2]);
+    if (least >= 0) return;
+    const float share = white > 0 ? white / (white - least) : 0;
+    for (int c = 0; c < 3; c++) rgb[c] = fmaxf(white + share * (rgb[c] - white), 0);
+}
+
+/* f_r by waves: of a perfect mirror, times Fresnel's factor of the film's color. */
+static void eval_waves(const struct film_material *m, const struct film_glint *g, const float wi[3], const float wo[3],
+                       float cosine, float f_rgb[3])
+{
+    const float sign = wo[1] < 0 ? -1.0f : 1.0f, away = fmaxf(0, 1 - cosine),
+                grazing = away * away * (away * away) * away;
+    const struct wave_glint_query q = {{(double)g->at.center_um[0], (double)g->at.center_um[1]},
+                                       {wi[0], wi[2], sign * wi[1]},
+                                       {wo[0], wo[2], sign * wo[1]}};
+    wave_glint_rgb(g->waves, &q, METAL_N, f_rgb);
+    into_gamut(f_rgb);
+    for (int c = 0; c < 3; c++) f_rgb[c] *= m->color[c] + (1 - m->color[c]) * grazing;
+}
+
 float film_glint_eval(const struct film_material *m, const struct film_glint *g, const float wi[3], const float wo[3],
                       float f_rgb[3])
 {
@@ -34,7 +58,10 @@ float film_glint_eval(const struct film_material *m, const struct film_glint *g,
     const float half[2] = {h[0], h[2]}, alpha2 = m->roughness * m->roughness,
                 q = half[0] * half[0] + half[1] * half[1] + alpha2 * h[1] * h[1], d = alpha2 / ((float)M_PI * q * q),
                 seen = glint_density(g->surface, &g->at, half);
-    for (int c = 0; c < 3; c++) f_rgb[c] *= seen / d;
+    if (g->waves != NULL)
+        eval_waves(m, g, wi, wo, cosine, f_rgb);
+    else
+        for (int c = 0; c < 3; c++) f_rgb[c] *= seen / d;
     return (1 - GLINT_SHARE) * smooth + GLINT_SHARE * seen * h[1] / (4 * fmaxf(cosine, 1e-6f));
 }
 

@@ -9,10 +9,12 @@
 
 #include "base/rng.h"
 #include "renderer/glint/glint_surface.h"
+#include "renderer/glint/wave_glint.h"
 #include "renderer/scattering/film_facets.h"
 
 struct film_glint {
     const struct glint_surface *surface; /* NULL: the film is smooth, as film_facets.h has it */
+    const struct wave_glint *waves;      /* NULL: geometric optics; else f_r is that of waves at center_um, times F */
     struct glint_footprint at;           /* u along the film, v across it */
 };
 

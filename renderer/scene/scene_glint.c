@@ -19,6 +19,7 @@
 struct scene_glints {
     pthread_mutex_t lock;
     struct glint_surface *surface[FILM_MAX_GROUP];
+    struct wave_glint *waves[FILM_MAX_GROUP];
 };
 
 bool scene_has_glints(const struct film_groups *films)
@@ -38,7 +39,10 @@ struct scene_glints *scene_glints_new(void)
 void scene_glints_free(struct scene_glints *g)
 {
     if (g == NULL) return;
-    for (int k = 0; k < FILM_MAX_GROUP; k++) glint_surface_free(g->surface[k]);
+    for (int k = 0; k < FILM_MAX_GROUP; k++) {
+        glint_surface_free(g->surface[k]);
+        wave_glint_free(g->waves[k]);
+    }
     pthread_mutex_destroy(&g->lock);
     free(g);
 }
@@ -60,16 +64,48 @@ static status make(const struct film_material *m, uint64_t seed, struct glint_su
     return glint_surface_new(&o, out, err);
 }
 
+/* The heights of a film with waves. Grains are at least 4 um and at most an eighth of the tile; the slopes of noise have
+ * the root mean square that glint_surface has, in two dimensions. A scratched film has 0.3 of its tile covered by
+ * grooves as steep as that, on noise of half of it. */
+static status make_waves(const struct film_material *m, uint64_t seed, struct wave_glint **out, struct error *err)
+{
+    struct wave_glint_option o = wave_glint_option_usual();
+    const double side_um = (double)o.height.n * o.height.texel_um,
+                 grain = fmin(fmax((double)m->grain_um, 4), side_um / 8), slope = fmin((double)m->roughness, 0.5);
+    o.model = (enum wave_model)(m->optics - FILM_OHS);
+    o.height.seed = seed;
+    o.height.length_um[0] = m->surface == FILM_BRUSHED ? fmin((double)BRUSHED_RATIO * grain, side_um) : grain;
+    o.height.length_um[1] = grain;
+    o.height.rms_um = slope / (M_SQRT2 * hypot(1 / o.height.length_um[0], 1 / o.height.length_um[1]));
+    if (m->surface == FILM_SCRATCHES) {
+        o.height.rms_um *= 0.5;
+        o.height.scratch_width_um = fmax(grain / 6, 1.5);
+        o.height.scratch_depth_um = slope * o.height.scratch_width_um;
+        o.height.n_scratch = (size_t)(0.3 * side_um / (0.2 * 4 * o.height.scratch_width_um));
+    }
+    return wave_glint_new(&o, out, err);
+}
+
 status scene_glints_make(const struct scene *s, struct error *err)
 {
     status st = STATUS_OK;
     if (s->glints == NULL) return st;
     pthread_mutex_lock(&s->glints->lock);
-    for (size_t k = 0; k < s->films.n && st == STATUS_OK; k++)
-        if (s->films.material[k].surface != FILM_SMOOTH && s->glints->surface[k] == NULL)
-            st = make(&s->films.material[k], k + 1, &s->glints->surface[k], err);
+    for (size_t k = 0; k < s->films.n && st == STATUS_OK; k++) {
+        const struct film_material *m = &s->films.material[k];
+        if (m->surface != FILM_SMOOTH && s->glints->surface[k] == NULL)
+            st = make(m, k + 1, &s->glints->surface[k], err);
+        if (st == STATUS_OK && film_has_waves(m) && s->glints->waves[k] == NULL)
+            st = make_waves(m, k + 1, &s->glints->waves[k], err);
+    }
     pthread_mutex_unlock(&s->glints->lock);
     return st;
+}
+
+const struct wave_glint *scene_glint_waves(const struct scene *s, const struct scene_hit *hit)
+{
+    const struct film_material *m = s->glints != NULL ? scene_film(s, hit->i_segment) : NULL;
+    return m != NULL ? s->glints->waves[m - s->films.material] : NULL;
 }
 
 /* The place of a hit in the flat cloth, tiles of its copy not taken off. */

@@ -179,6 +179,8 @@ static void take_material(const struct job_film *from, struct film_material *m)
     m->grain_um = (float)from->grain_um;
     for (uint32_t k = 0; film_surface_names[k] != NULL; k++)
         if (strcmp(film_surface_names[k], from->surface) == 0) m->surface = k;
+    for (uint32_t k = 0; film_optics_names[k] != NULL; k++)
+        if (strcmp(film_optics_names[k], from->optics) == 0) m->optics = k;
 }
 
 static void take_film(const struct job_film *from, struct cloth_kind *kind)

@@ -16,7 +16,7 @@
 struct job_film {
     double width_um, thickness_um, wraps_per_m, roughness, grain_um, color[3];
     double spacing_um, row_spacing_um, tilt_deg, tilt_spread_deg; /* of sequins */
-    char metal[16], surface[16];
+    char metal[16], surface[16], optics[16];
 };
 
 /* Counts and names that the document gives of a kind of yarn; 0 fibers: not given. */

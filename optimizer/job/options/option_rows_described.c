@@ -26,6 +26,7 @@
 
 static const char *weave_name(size_t i) { return cloth_weave_names[i]; }
 static const char *surface_name(size_t i) { return film_surface_names[i]; }
+static const char *optics_name(size_t i) { return film_optics_names[i]; }
 static const char *metal_name(size_t i) { return film_metal_names[i]; }
 
 /* Rows of a film or of sequins, whose paths begin with `where`; `numbers` and `texts` say where values go. */
@@ -55,6 +56,13 @@ static const char *metal_name(size_t i) { return film_metal_names[i]; }
          .choice_at = surface_name,                                                                                    \
          .standard = "\"smooth\"",                                                                                     \
          .meaning = "Facets that glitter one by one in pictures, or their mean (`smooth`)."},                          \
+        {.path = where "optics",                                                                                       \
+         .kind = OPTION_WORD,                                                                                          \
+         texts(optics),                                                                                                \
+         .choice_at = optics_name,                                                                                     \
+         .standard = "\"rays\"",                                                                                       \
+         .meaning =                                                                                                    \
+             "Colored glints of light as waves, by a diffraction model; of `noise`, `brushed` and `scratches`."},      \
         FILM_NUMBER(where, numbers, grain_um, 1, 1000, "um", "40", "Size of flakes, waves or scratches that glitter.")
 #define FILM_OF_YARN(member) INTO_OF(struct job_cloth_yarn, film.member)
 #define FILM_TEXT_OF_YARN(member) TEXT_INTO_OF(struct job_cloth_yarn, film.member)

@@ -87,6 +87,7 @@ static void see_glints(const struct walk *w, struct bounce *b)
 {
     float place_um[2];
     b->glint.surface = scene_glint_at(w->s->scene, &b->hit, b->offset_mm, place_um);
+    b->glint.waves = scene_glint_waves(w->s->scene, &b->hit);
     if (b->glint.surface != NULL) film_glint_see(&b->glint, place_um, w->s->pixel_um, b->wo);
 }
 
