@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-thesis bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports exports-side-by-side bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-chapter4 bench-glints bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics gallery docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-sheared bench-weave bench-weave-rendered
+.PHONY: bench bench-thesis bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports exports-side-by-side bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-chapter4 bench-glints bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-waves docs-lobes docs-fabrics gallery docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-sheared bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 $(BUILD)/tests/bench/models/bench_waves: LINK_TEST := $(LINK_WAVE)
 # bench_fit is more than one file
@@ -192,6 +192,11 @@ docs-lobes:        ## draw NAME-lobes.svg in every folder of renderer/scattering
 	@$(MAKE) --no-print-directory $(BUILD)/tests/bench/models/draw_lobes >&2
 	@for rows in renderer/scattering/models/*/*.def; do \
 		$(BUILD)/tests/bench/models/draw_lobes $$(sed -nE 's/^(SURFACE|VOLUME)_MODEL\(\w+, "([^"]+)".*/\2/p' $$rows) > $${rows%_rows.def}-lobes.svg || exit 1; done
+
+docs-waves: | deps-test ## draw docs/images/wave-lame.jpg anew: a lame by geometric optics and by waves (two minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/pictures/wave_film_pictures
+	@$(BUILD)/tests/bench/pictures/wave_film_pictures $(BUILD)/wave-lame.png
+	@/usr/bin/python3 -c "from PIL import Image; Image.open('$(BUILD)/wave-lame.png').save('docs/images/wave-lame.jpg', quality=88)"
 
 docs-speckle: | deps-test ## make docs/images/speckle.png anew: silk without and with speckle (half a minute of a core)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/pictures/speckle_pictures

@@ -61,8 +61,7 @@ static const char *metal_name(size_t i) { return film_metal_names[i]; }
          texts(optics),                                                                                                \
          .choice_at = optics_name,                                                                                     \
          .standard = "\"rays\"",                                                                                       \
-         .meaning =                                                                                                    \
-             "Colored glints of light as waves, by a diffraction model; of `noise`, `brushed` and `scratches`."},      \
+         .meaning = "Diffraction model of colored glints, not of `smooth` and `flakes`."},                             \
         FILM_NUMBER(where, numbers, grain_um, 1, 1000, "um", "40", "Size of flakes, waves or scratches that glitter.")
 #define FILM_OF_YARN(member) INTO_OF(struct job_cloth_yarn, film.member)
 #define FILM_TEXT_OF_YARN(member) TEXT_INTO_OF(struct job_cloth_yarn, film.member)
