@@ -7,10 +7,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Films are groups of fibers of their own (fiber_set.h), after those of the kinds of yarn. */
+/* Films are groups of fibers of their own (fiber_set.h), after the kinds of yarn. */
 enum { FILM_MAX_GROUP = 5 };
 
-/* What a camera sees of a film from near: facets one by one (renderer/glint), of the kinds of glint_kind, brushed along
+/* A film from near: facets one by one (renderer/glint), of the kinds of glint_kind, brushed along
  * the film; or their mean. */
 enum film_surface { FILM_SMOOTH, FILM_NOISE, FILM_BRUSHED, FILM_SCRATCHES, FILM_FLAKES };
 extern const char *const film_surface_names[]; /* in this order, ended by NULL */
@@ -35,7 +35,7 @@ static inline bool film_has_waves(const struct film_material *m)
     return m->optics != FILM_RAYS && m->surface != FILM_SMOOTH && m->surface != FILM_FLAKES;
 }
 
-/* The films of a cloth: material k is that of group first_group + k. */
+/* The films of a cloth: material k belongs to group first_group + k. */
 struct film_groups {
     size_t first_group, n; /* n 0: none */
     struct film_material material[FILM_MAX_GROUP];

@@ -49,7 +49,7 @@ status glint_lattice_make(const struct glint_option *o, const struct glint_map *
                           struct error *err);
 void glint_lattice_release(struct glint_lattice *l);
 
-/* What the elements under one footprint have in common. Symmetric matrices are uu, uv, vv. */
+/* Numbers that all elements under one footprint share. Symmetric matrices are uu, uv, vv. */
 struct glint_query {
     float center_um[2];
     float wide[3], inverse[3]; /* C and its inverse, um^2 */

@@ -57,7 +57,7 @@ void wave_glint_rgb(const struct wave_glint *g, const struct wave_glint_query *q
 /* Draws wo for wi with the density wave_glint_pdf: the slope of a place in the window, drawn by w^2, is blurred by a
  * Gaussian as wide as diffraction, or in a sixth of the samples as a kernel. u: four numbers in [0, 1), and u[4] that
  * chooses the width. Returns false when the direction is below the surface, which stands for f_r = 0.
- * Differs from section 3.12: the density is that of intensities, and the weight f_r cos_o / pdf is not taken as 1. */
+ * Differs from section 3.12: the density is by intensities, and the weight f_r cos_o / pdf is not taken as 1. */
 bool wave_glint_sample(const struct wave_glint *g, const double center_um[2], const float wi[3], const float u[5],
                        float wo[3]);
 /* Density per steradian of wo, of the query's wi. Its integral is the share of samples above the surface. */

@@ -1,6 +1,6 @@
 /* A film whose facets are seen one by one: D of film_facets.h is the distribution of normals under the footprint of a
  * pixel (renderer/glint/glint_surface.h; 000, equation 3.1). D there is a density over the disk of projected normals,
- * which for a GGX surface is the D of film_facets.h. Masking stays that of GGX.
+ * which for a GGX surface is the D of film_facets.h. Masking stays as for GGX.
  *
  * Samples: with probability GLINT_SHARE at a normal of D, whose density per steradian of wi is D |h.n| / (4 |o.h|),
  * else at a facet of GGX; the density is the mixture's. */
@@ -14,7 +14,7 @@
 
 struct film_glint {
     const struct glint_surface *surface; /* NULL: the film is smooth, as film_facets.h has it */
-    const struct wave_glint *waves;      /* NULL: geometric optics; else f_r is that of waves at center_um, times F */
+    const struct wave_glint *waves;      /* NULL: geometric optics; else f_r is by waves at center_um, times F */
     struct glint_footprint at;           /* u along the film, v across it */
 };
 

@@ -64,7 +64,7 @@ static status make(const struct film_material *m, uint64_t seed, struct glint_su
     return glint_surface_new(&o, out, err);
 }
 
-/* The heights of a film with waves. Grains are at least 4 um and at most an eighth of the tile; the slopes of noise have
+/* The heights of a film with waves. Grains are at least 4 um and at most an eighth of the tile; slopes of noise have
  * the root mean square that glint_surface has, in two dimensions. A scratched film has 0.3 of its tile covered by
  * grooves as steep as that, on noise of half of it. */
 static status make_waves(const struct film_material *m, uint64_t seed, struct wave_glint **out, struct error *err)

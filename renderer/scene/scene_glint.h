@@ -13,7 +13,7 @@ status scene_glints_make(const struct scene *scene, struct error *err);
  * NULL: it has no glints. */
 const struct glint_surface *scene_glint_at(const struct scene *scene, const struct scene_hit *hit,
                                            const double offset_mm[2], float place_um[2]);
-/* The height field of the film that was hit; NULL: it reflects by geometric optics. Places are those on its surface. */
+/* The height field of the film that was hit; NULL: it reflects by geometric optics. Places are as on its surface. */
 const struct wave_glint *scene_glint_waves(const struct scene *scene, const struct scene_hit *hit);
 
 #endif

@@ -1,4 +1,4 @@
-/* Films that reflect light as waves: a sheet of film has the mean of its reflectance over the map, in colors that differ
+/* Films that reflect light as waves: a sheet of film has the mean of its reflectance over the map, in colors that vary
  * from pixel to pixel; names of models are those of the library. */
 #include "base/angle.h"
 #include "base/rng.h"
