@@ -156,6 +156,59 @@ static void elements_match_a_histogram(void **state)
         }
 }
 
+/* Light of a round lamp, whose half vectors fill a disk of (s, t), three ways: samples of normals, samples of the lamp,
+ * and both with the balance heuristic (000, figure 3.12). place: of the lamp's middle. Fills in means for one sample
+ * each. */
+static void lamp_estimates(const struct glint_surface *s, const struct glint_footprint *f, const float place[2],
+                           float radius, struct sample_mean mean[3])
+{
+    const float lamp_pdf = 1 / ((float)M_PI * radius * radius);
+    const struct rng_key key = {.seed = 12};
+    struct rng r;
+    rng_start(&r, &key, 0, 0);
+    memset(mean, 0, 3 * sizeof *mean);
+    for (int i = 0; i < 20000; i++) {
+        float u[GLINT_N_NUMBER], normal[2], lamp[2];
+        for (int c = 0; c < GLINT_N_NUMBER; c++) u[c] = rng_float(&r);
+        glint_sample(s, f, u, normal);
+        const float out = radius * sqrtf(rng_float(&r)), turn = 2 * (float)M_PI * rng_float(&r);
+        lamp[0] = place[0] + out * cosf(turn);
+        lamp[1] = place[1] + out * sinf(turn);
+        const bool is_hit = hypotf(normal[0] - place[0], normal[1] - place[1]) < radius;
+        const float at_normal = is_hit ? glint_pdf(s, f, normal) : 0, at_lamp = glint_density(s, f, lamp);
+        sample_mean_add(&mean[0], is_hit ? 1 : 0);
+        sample_mean_add(&mean[1], (double)(at_lamp / lamp_pdf));
+        sample_mean_add(&mean[2],
+                        (double)((is_hit ? at_normal / (at_normal + lamp_pdf) : 0) + at_lamp / (at_lamp + lamp_pdf)));
+    }
+}
+
+static void samples_and_light_combine(void **state)
+{
+    (void)state;
+    struct glint_surface *s = surface_of(&kinds[0]);
+    const struct glint_footprint narrow = {{64, 64}, {0.01F, 0, 0.01F}}, wide = places[6];
+    const struct {
+        const struct glint_footprint *f;
+        float radius;
+    } lamps[] = {{&narrow, 0.15F}, {&wide, 0.01F}, {&wide, 0.1F}};
+    for (int k = 0; k < 3; k++) {
+        struct sample_mean mean[3];
+        float place[2] = {0, 0};
+        const float u[GLINT_N_NUMBER] = {0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F};
+        glint_sample(s, lamps[k].f, u, place);
+        lamp_estimates(s, lamps[k].f, place, lamps[k].radius, mean);
+        const double se[3] = {sample_mean_se(&mean[0]), sample_mean_se(&mean[1]), sample_mean_se(&mean[2])};
+        print_message("lamp %d: %.4f +- %.4f, %.4f +- %.4f, %.4f +- %.4f\n", k, mean[0].mean, se[0], mean[1].mean,
+                      se[1], mean[2].mean, se[2]);
+        for (int i = 0; i < 2; i++) assert_true(fabs(mean[i].mean - mean[2].mean) < 3.5 * hypot(se[i], se[2]) + 1e-3);
+        /* nearly as good as the better of both, whose variance may be 0 */
+        assert_true(se[2] < 1.2 * fmin(se[0], se[1]) + 0.05 * fmax(se[0], se[1]));
+        assert_true(mean[2].mean > 0.005);
+    }
+    glint_surface_free(s);
+}
+
 static void faults_are_named(void **state)
 {
     (void)state;
@@ -178,9 +231,8 @@ static void faults_are_named(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(density_integrates_to_one),
-        cmocka_unit_test(samples_have_their_density),
-        cmocka_unit_test(elements_match_a_histogram),
+        cmocka_unit_test(density_integrates_to_one),  cmocka_unit_test(samples_have_their_density),
+        cmocka_unit_test(elements_match_a_histogram), cmocka_unit_test(samples_and_light_combine),
         cmocka_unit_test(faults_are_named),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
