@@ -6,7 +6,7 @@
  * lost: glint_density returns 0 there, and a path whose sample lies there ends. With half vector h, D replaces the
  * distribution of a microfacet model (equation 3.1):
  *
- *     f_r = F G D(h) / (4 (i.n) (o.n)),   pdf of wo = D(h) / (4 |wi.h| |h.n|)
+ *     f_r = F G D(h) / (4 (i.n) (o.n)),   pdf of wo = D(h) |h.n| / (4 |wi.h|)
  *
  * where |h.n| turns the measure of the disk into a solid angle of h, and 1 / (4 |wi.h|) this one into one of wo.
  *

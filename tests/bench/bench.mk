@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-thesis bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports exports-side-by-side bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-chapter4 bench-glints bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-waves docs-lobes docs-fabrics gallery docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-sheared bench-weave bench-weave-rendered
+.PHONY: bench bench-thesis bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports exports-side-by-side bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-chapter4 bench-glints bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-waves docs-lobes docs-fabrics gallery docs-ground docs-lame docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-sheared bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 $(BUILD)/tests/bench/models/bench_waves: LINK_TEST := $(LINK_WAVE)
 # bench_fit is more than one file
@@ -227,6 +227,11 @@ docs-fabrics: | deps-test ## make docs/images/six-fabrics.png anew: the fabrics 
 gallery: | deps-test ## make the pictures of docs/gallery.md anew: six fabrics in the studio, four views of 1,024 pixels each (an hour on two cores; kept in build; GALLERY="--px 400 --samples 6 twill": quicker)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/pictures/gallery.py --build $(BUILD) --out docs/images/gallery $(GALLERY)
+
+docs-lame: | deps-test ## make docs/images/{lame.webp,sequins.jpg} anew: a drape of lame under a lamp that goes around, and sequins (some minutes; kept in build)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/pictures/lame_pictures.py --build $(BUILD) --out docs/images/lame.webp
+	@/usr/bin/python3 tests/bench/pictures/sequin_picture.py --build $(BUILD) --out docs/images/sequins.jpg
 
 docs-ground: | deps-test ## make docs/images/ground-shadow.png anew: cloths over a plane, as rendered and filtered (half a minute of a core; kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2

@@ -41,28 +41,28 @@ static const char *metal_name(size_t i) { return film_metal_names[i]; }
      texts(metal),                                                                                                     \
      .choice_at = metal_name,                                                                                          \
      .standard = "\"silver\"",                                                                                         \
-     .meaning = "Metal, which gives the color."},                                                                      \
+     .meaning = "Gives the color."},                                                                                   \
         {.path = where "color",                                                                                        \
          .kind = OPTION_NUMBERS,                                                                                       \
          many(color),                                                                                                  \
          RANGE(0.001, 1),                                                                                              \
          .left_out = "from the metal",                                                                                 \
          .allowed = "r, g, b",                                                                                         \
-         .meaning = "Reflectance at normal incidence, of a lacquered film."},                                          \
-        FILM_NUMBER(where, numbers, roughness, 0.02, 1, NULL, "0.2", "Roughness of the metal: alpha of GGX."),         \
+         .meaning = "Reflectance at normal incidence."},                                                               \
+        FILM_NUMBER(where, numbers, roughness, 0.02, 1, NULL, "0.2", "Alpha of GGX."),                                 \
         {.path = where "surface",                                                                                      \
          .kind = OPTION_WORD,                                                                                          \
          texts(surface),                                                                                               \
          .choice_at = surface_name,                                                                                    \
          .standard = "\"smooth\"",                                                                                     \
-         .meaning = "Facets that glitter one by one in pictures, or their mean (`smooth`)."},                          \
+         .meaning = "Facets that glitter in pictures, or `smooth`."},                                                  \
         {.path = where "optics",                                                                                       \
          .kind = OPTION_WORD,                                                                                          \
          texts(optics),                                                                                                \
          .choice_at = optics_name,                                                                                     \
          .standard = "\"rays\"",                                                                                       \
          .meaning = "Diffraction model of colored glints, not of `smooth` and `flakes`."},                             \
-        FILM_NUMBER(where, numbers, grain_um, 1, 1000, "um", "40", "Size of flakes, waves or scratches that glitter.")
+        FILM_NUMBER(where, numbers, grain_um, 1, 1000, "um", "40", "Size of what glitters.")
 #define FILM_OF_YARN(member) INTO_OF(struct job_cloth_yarn, film.member)
 #define FILM_TEXT_OF_YARN(member) TEXT_INTO_OF(struct job_cloth_yarn, film.member)
 #define FILM_NUMBERS_OF_YARN(member) NUMBERS_INTO_OF(struct job_cloth_yarn, film.member)
@@ -238,7 +238,7 @@ const struct job_option option_rows_described[] = {
          "(lame); such kinds come last and have no `name`."},
     FILM_NUMBER("cloth.yarns[].film_", FILM_OF_YARN, thickness_um, 2, 500, "um", "12", "Thickness of the film."),
     FILM_NUMBER("cloth.yarns[].film_", FILM_OF_YARN, wraps_per_m, -50000, 50000, "1/m", "0",
-                "Turns of the film in a metre, rounded to whole turns in the tile."),
+                "Turns in a metre; whole in the tile."),
     FILM_METAL("cloth.yarns[].film_", FILM_OF_YARN, FILM_NUMBERS_OF_YARN, FILM_TEXT_OF_YARN),
     {.path = "cloth.sequin_diameter_um",
      .kind = OPTION_NUMBER,
@@ -249,7 +249,7 @@ const struct job_option option_rows_described[] = {
      .meaning = "Diameter of sequins: discs of metallised film on the face of the cloth."},
     FILM_NUMBER("cloth.sequin_", SEQUIN, thickness_um, 5, 2000, "um", "100", "Their thickness."),
     FILM_NUMBER("cloth.sequin_", SEQUIN, spacing_um, 50, 100000, "um", "3000",
-                "Between middles along the weft, rounded so that the tile has whole sequins."),
+                "Their distance along the weft, at which the tile has whole ones."),
     FILM_NUMBER("cloth.sequin_", SEQUIN, row_spacing_um, 50, 100000, "um", "2000", "Between their rows."),
     FILM_NUMBER("cloth.sequin_", SEQUIN, tilt_deg, 0, 60, "deg", "12", "Tilt of all, by which they overlap."),
     FILM_NUMBER("cloth.sequin_", SEQUIN, tilt_spread_deg, 0, 20, "deg", "2", "Standard deviation of single tilts."),
