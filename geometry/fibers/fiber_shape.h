@@ -14,7 +14,7 @@ struct fiber_shape {
     float lumen, lumen_se;   /* width of the lumen over the outline's; with an error of 0: not measured */
 };
 
-/* Largest ratio of axes that files may state: that of a film. The fit goes up to 4. */
+/* Largest ratio of axes that files may state, for films. The fit goes up to 4. */
 #define FIBER_RATIO_MOST 200.0f
 /* Mean ratio of axes of a cloth from which on its fibers are flat. Round ones come out as up to some 1.1. */
 #define FIBER_RATIO_FLAT 1.15

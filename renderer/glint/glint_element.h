@@ -59,7 +59,7 @@ struct glint_query {
 };
 void glint_query_init(const struct glint_lattice *l, const struct glint_footprint *at, struct glint_query *q);
 
-/* Sum of density / q->factor of n elements at the normal half; index: of elements. shift_um: what is added to their
+/* Sum of density / q->factor of n elements at the normal half; index: of elements. shift_um: added to their
  * places. */
 float glint_query_sum(const struct glint_query *q, const struct glint_element *element, const uint32_t *index, size_t n,
                       const float shift_um[2], const float half[2]);

@@ -13,7 +13,7 @@ enum glint_kind {
     GLINT_FLAKES     /* flat flakes, whose normals have a Beckmann distribution */
 };
 
-/* Zero where not given: then the value in parentheses holds. STATUS_INVALID for what is out of range. */
+/* Zero where not given: then the value in parentheses holds. STATUS_INVALID for values out of range. */
 struct glint_option {
     enum glint_kind kind;
     uint64_t seed;

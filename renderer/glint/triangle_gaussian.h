@@ -17,7 +17,7 @@ struct triangle_query {
 };
 
 /* Returns the integral over u in the triangle. The inner integral, along the axis on which the integrand is narrower,
- * is closed (erf); the outer one is a sum by Gauss and Legendre over pieces no wider than what it integrates. */
+ * is closed (erf); the outer one is a sum by Gauss and Legendre over pieces no wider than its integrand. */
 double triangle_gaussian(const struct glint_triangle *t, const struct triangle_query *q);
 
 #endif

@@ -36,7 +36,7 @@ static float stretched(const float w[3], float alpha)
     return sqrtf(w[2] * w[2] + alpha * alpha * (w[0] * w[0] + w[1] * w[1]));
 }
 
-/* ln f_r by alpha: q and s are those of D and of the masking. */
+/* ln f_r by alpha: q and s are as in D and in the masking. */
 static float slope_by_alpha(const struct facing *f, float alpha, float q, float s_i, float s_o)
 {
     const float by_s_i = alpha * (f->i[0] * f->i[0] + f->i[1] * f->i[1]) / s_i,

@@ -1,5 +1,5 @@
 /* The smooth surface of a bent cloth without its fibers, for previews (renderer/preview/proxy): the outer faces of its
- * shell, which lie on both sides of the cloth and at its cut edges. Its normals are those of the mesh, and go smoothly
+ * shell, which lie on both sides of the cloth and at its cut edges. Its normals belong to the mesh, and go smoothly
  * over its triangles. Millimetres; the orbit center is the origin. Threads: any number on one scene.
  */
 #ifndef SELVEDGE_RENDERER_SCENE_PROXY_H

@@ -88,7 +88,7 @@ static void deviations(const struct profile_search *s, double *sd)
                              : sqrt(range_variance(t, index[a]));
 }
 
-/* Half of the standard deviation of a turn of which nothing is known. */
+/* Half of the standard deviation of an unknown turn. */
 static const double determined_turn_rad = 0.5 * M_PI / 3.4641016151377544;
 
 static bool near_bound(const struct coordinate *k, double x)

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Rays of pixels on both sides of the plane in focus, besides those of all pixels (section 5.5). */
+/* Rays of pixels on both sides of the plane in focus, besides the rays of all pixels (section 5.5). */
 enum { EXTRA_RAYS = 36 };
 
 struct run {
