@@ -266,7 +266,7 @@ static status choose_block(struct scene *s, const struct fiber_set *f, struct er
     return STATUS_OK;
 }
 
-/* What films with glints need. */
+/* Arc lengths and surfaces for films with glints. */
 static status add_glints(struct scene *s, struct error *err)
 {
     if (!scene_has_glints(&s->films)) return STATUS_OK;

@@ -76,7 +76,7 @@ void scene_embree_free(struct scene *s)
 
 /* ---- rays ---- */
 
-/* What the filters are told. */
+/* Context of the filters. */
 struct query {
     struct RTCIntersectContext embree;
     struct scene_visitor *visitor;

@@ -193,10 +193,10 @@ docs-lobes:        ## draw NAME-lobes.svg in every folder of renderer/scattering
 	@for rows in renderer/scattering/models/*/*.def; do \
 		$(BUILD)/tests/bench/models/draw_lobes $$(sed -nE 's/^(SURFACE|VOLUME)_MODEL\(\w+, "([^"]+)".*/\2/p' $$rows) > $${rows%_rows.def}-lobes.svg || exit 1; done
 
-docs-waves: | deps-test ## draw docs/images/wave-lame.jpg anew: a lame by geometric optics and by waves (two minutes)
+docs-waves: | deps-test ## draw docs/images/wave-lame.jpg anew: a lame by geometric optics and by waves (ten seconds)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/pictures/wave_film_pictures
 	@$(BUILD)/tests/bench/pictures/wave_film_pictures $(BUILD)/wave-lame.png
-	@/usr/bin/python3 -c "from PIL import Image; Image.open('$(BUILD)/wave-lame.png').save('docs/images/wave-lame.jpg', quality=88)"
+	@/usr/bin/python3 -c "from PIL import Image; i = Image.open('$(BUILD)/wave-lame.png'); i.resize((2 * i.width, 2 * i.height), 0).save('docs/images/wave-lame.jpg', quality=88)"
 
 docs-speckle: | deps-test ## make docs/images/speckle.png anew: silk without and with speckle (half a minute of a core)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/pictures/speckle_pictures

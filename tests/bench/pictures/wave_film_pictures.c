@@ -15,7 +15,7 @@
 
 #define EXPOSURE 0.08f
 
-enum { PANEL = 320, GAP = 8, WIDTH = 2 * PANEL + GAP };
+enum { PANEL = 160, GAP = 8, WIDTH = 2 * PANEL + GAP };
 
 /* Dark warps of fibers over wefts that are films alone, in turn brushed silver and bumpy gold. */
 static status make_cloth(enum film_optics optics, struct scene **scene, struct error *err)
@@ -112,7 +112,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "wave_film_pictures FILE.png [samples]\n");
         return 2;
     }
-    const size_t n_sample = argc > 2 ? strtoul(argv[2], NULL, 10) : 32;
+    const size_t n_sample = argc > 2 ? strtoul(argv[2], NULL, 10) : 4;
     status st = thread_pool_new(0, &pool, &err);
     if (st == STATUS_OK) st = draw(pool, n_sample, argv[1], &err);
     if (st != STATUS_OK) fprintf(stderr, "%s\n", err.text);
