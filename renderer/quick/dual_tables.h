@@ -14,8 +14,8 @@
 
 enum { DUAL_N_THETA = 46, DUAL_N_PHI = 9, DUAL_N_SPREAD = 10 };
 
-/* Of light from one theta. The fractions are those of the light that meets the fiber, for each channel; shifts and
- * variances are those of theta_o + theta_i, weighted by the energy of all channels. */
+/* Of light from one theta. The fractions are shares of the light that meets the fiber, for each channel; shifts and
+ * variances belong to theta_o + theta_i, weighted by the energy of all channels. */
 struct dual_average {
     float forward[3];  /* fraction scattered into the half away from the light: a_f of equation 2.18 */
     float backward[3]; /* into the half on the light's side: a_b */

@@ -79,7 +79,7 @@ static inline float ray_field_offset(const struct ray_field *f, const struct ray
 /* Counts a slope, which is not 0. */
 void ray_pixel_meet(struct ray_pixel *p, float slope);
 /* Replaces slopes by their means over the 5 x 5 pixels around that have met anything, as light_field_smooth_slopes,
- * but those of receivers that ray_pixel_near refuses. STATUS_NO_MEMORY. */
+ * but not for receivers that ray_pixel_near refuses. STATUS_NO_MEMORY. */
 status ray_field_smooth_slopes(struct ray_field *f, struct error *err);
 /* Whether q is a neighbour of p on the same smooth surface: near its plane, and at most 20 degrees from its normal
  * (section 5.5). */

@@ -1,6 +1,6 @@
 /* Sheared filtering in four passes of one dimension (equations 5.7 to 5.10): in blocks of pixels, along the first axis
  * into sums for each pixel and bin of the second axis, then along the second. Axes run across the screen in any
- * direction, differently at each pixel, so what a pass makes of a pixel is kept for the pixels of a block around it. */
+ * direction, differently at each pixel, so a pass's result at a pixel is kept for the pixels of a block around. */
 #include "renderer/preview/pixels/ray_filter.h"
 #include "renderer/preview/pixels/ray_kernel.h"
 
@@ -13,7 +13,7 @@
 enum { BINS_A_RAY = 4, BLOCK = 64, AROUND = BLOCK + 2 * RAY_REACH };
 
 struct block {
-    struct ray_sum *made; /* [AROUND][AROUND][n_made]: what a pass has made of a pixel */
+    struct ray_sum *made; /* [AROUND][AROUND][n_made]: results of a pass at a pixel */
     bool *is_made;        /* [AROUND][AROUND] */
 };
 
@@ -75,7 +75,7 @@ static void convolve_bins(const struct run *r, size_t i, struct ray_sum *out)
         }
 }
 
-/* What step 1a or 2a makes of pixel `at`, which lies around the block that starts at `corner`. */
+/* The result of step 1a or 2a at pixel `at`, which lies around the block that starts at `corner`. */
 static const struct ray_sum *made_of(const struct run *r, struct block *block, const long corner[2], size_t at,
                                      int pass)
 {

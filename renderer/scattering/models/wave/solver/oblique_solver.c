@@ -13,7 +13,7 @@ enum kernel { TWICE, SINGLE_OUTSIDE, SINGLE_INSIDE, SLOPE, PRIME_OUTSIDE, PRIME_
 enum { MOST_SYSTEM = 2 };
 #define SYMMETRIC_WITHIN 1e-11 /* of the largest distance of two mirrored nodes, over the extent */
 
-/* Values at the nodes that stand for a function: all (sign 0), or those of the upper half for even (1) and odd (-1)
+/* Values at the nodes that stand for a function: all (sign 0), or the upper half's for even (1) and odd (-1)
  * functions of t. */
 struct fold {
     size_t first, n;
@@ -278,7 +278,7 @@ static void fill_incident(const struct oblique_solver *s, const struct fold *f, 
     }
 }
 
-/* Adds the solution of one symmetry to those of all nodes. */
+/* Adds the solution of one symmetry to the values at all nodes. */
 static void spread(struct oblique_solver *s, const struct equations *e, const double complex *b, size_t n_column)
 {
     const size_t n = s->nodes.n;
