@@ -51,6 +51,7 @@
 #define OPTION_ENVIRONMENT_FILE "environment_file"
 #define OPTION_MESH_FILE "mesh_file"
 #define OPTION_PICTURE_RADIUS "picture_radius"
+#define OPTION_TILES "tiles"
 #define OPTION_PICTURE_METHOD "picture_method"
 #define OPTION_REPORT_PDF "report_pdf"
 #define OPTION_RIG "rig_file"

@@ -6,6 +6,7 @@
 #include "geometry/diameter/lumen_evidence.h"
 #include "geometry/diameter/scan_densities.h"
 #include "geometry/fibers/seam/fiber_seam.h"
+#include "geometry/fibers/tiles/fiber_tiles.h"
 #include "geometry/grade/fiber_kinds.h"
 #include "geometry/grade/scan_grade.h"
 #include "geometry/grade/scan_trial.h"
@@ -33,6 +34,7 @@ struct reconstruct_report {
     struct seam_density seam_density;         /* of the volume as used */
     struct fiber_seam seam_found, seam_fiber; /* of the fibers as found, and as used with their ends joined */
     struct seam_join seam_join;               /* all zero if they were not joined */
+    struct fiber_tiles tiles;                 /* of the large tile; n_move 0: none was asked for */
     double density_low, density_high;         /* scanner values */
     double separability;                      /* of void and material in the histogram, 0..1 (density_map.h) */
     struct light_material light;              /* fibers that were raised to the density of others */

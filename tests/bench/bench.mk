@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-thesis bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports exports-side-by-side bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-chapter4 bench-glints bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-waves docs-lobes docs-fabrics gallery docs-ground docs-lame docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-sheared bench-weave bench-weave-rendered
+.PHONY: bench bench-thesis bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports exports-side-by-side bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-chapter4 bench-glints bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-waves docs-lobes docs-fabrics gallery docs-ground docs-lame docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-sheared bench-tiles bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 $(BUILD)/tests/bench/models/bench_waves: LINK_TEST := $(LINK_WAVE)
 # bench_fit is more than one file
@@ -76,6 +76,10 @@ bench-pile: | deps-test ## previews of velvets by dual scattering and by diffusi
 bench-sheared: | deps-test ## previews by sheared filtering: rays for equal errors against own rays and the axis-aligned filter, and time (two minutes of a core)
 	@$(MAKE) --no-print-directory $(BUILD)/tests/bench/pictures/bench_sheared >&2
 	@$(BUILD)/tests/bench/pictures/bench_sheared
+
+bench-tiles: | deps-test ## large tiles of a scan: how far its period stands out of a picture (three minutes of a core; kept in build)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/pictures/bench_tiles.py --build $(BUILD)
 
 # WEAVES, CONDITIONS: comma-separated, such as WEAVES=twill CONDITIONS=spread,hollow; then without time and memory
 bench-geometry: | deps-test ## accuracy of reconstructed fibers on phantoms and real scans; time and memory

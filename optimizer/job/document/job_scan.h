@@ -27,6 +27,7 @@ struct job_scan {
     size_t crop_voxel[6];
     bool align, crop; /* true for "auto"; false where matrix or crop_voxel is given */
     double crop_keep;
+    size_t tiles; /* blocks a side of the large tile; 1: none */
     bool join_seams, transfer_directions, three_subvolumes, unresolved_fibers, trial;
     int hollow_fibers;           /* 0, 1, or -1: decided from the scan */
     double fiber_diameter_voxel; /* NaN: measured */

@@ -191,6 +191,15 @@ const struct job_option option_rows_cloth[] = {
      .standard = "true",
      .meaning = "Yarns and fibers that are cut at a face of the tile are joined to those of the opposite face: a "
                 "smooth warp, then ends within six radii."},
+    {.path = "volume.tiles",
+     .kind = OPTION_COUNT,
+     INTO(scan, tiles),
+     .id = OPTION_TILES,
+     RANGE(1, 16), /* FIBER_TILES_MAX */
+     .standard = "1",
+     .meaning = "Blocks along each edge of a large tile of fibers, from a scan of several repeats: moved by repeats, "
+                "joined along "
+                "cuts of least error."},
     {.path = "volume.three_subvolumes",
      .kind = OPTION_BOOL,
      INTO(scan, three_subvolumes),

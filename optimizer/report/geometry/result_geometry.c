@@ -64,6 +64,12 @@ static json_t *seam_fibers_json(const struct reconstruct_report *g)
     json_object_set_new(json, "offset_found_um",
                         scanned ? json_number_list(g->seam_found.offset_m, 2, 1e6) : json_null());
     json_object_set_new(json, "warp_um", scanned ? json_number_list(g->seam_join.warp_m, 2, 1e6) : json_null());
+    const struct fiber_tiles *t = &g->tiles;
+    json_object_set_new(json, "tiles",
+                        t->n_move == 0 ? json_null()
+                                       : json_pack("{s:o, s:o, s:o, s:o}", "n_move", json_count(t->n_move), "n_cut_end",
+                                                   json_count(t->n_cut_end), "n_free", json_count(t->n_free), "move_um",
+                                                   json_number(1e6 * t->move_m)));
     json_object_set_new(json, "shift_um", scanned ? json_number_list(g->seam_join.shift_m, 2, 1e6) : json_null());
     return json;
 }

@@ -172,6 +172,19 @@ static void drop_unseen(const struct directions_input *in, struct directions_out
     out->geometry.total_length_m = fiber_set_length_m(&out->fiber);
 }
 
+/* Makes the large tile that the document asks for. */
+static status make_tiles(const struct directions_input *in, struct directions_output *out, struct error *err)
+{
+    const uint64_t seed = 1;
+    if (in->scan->tiles < 2) return STATUS_OK;
+    status s = fiber_tiles_make(&out->fiber, in->scan->tiles, seed, &out->geometry.tiles, err);
+    if (s == STATUS_OK && out->geometry.tiles.n_move < 2)
+        worker_status_warn(in->tools->status,
+                           "the tile of the scan shows no repeat, so it is not made larger: see '%s'",
+                           job_option_key(OPTION_TILES));
+    return s;
+}
+
 /* Joins the ends of the fibers across the seams of the tile, once the voxels of the scan have taken their
  * directions: the joined fibers no longer lie where the scan shows them near the faces. */
 static status join_seams(const struct directions_input *in, struct directions_output *out, struct error *err)
@@ -181,6 +194,7 @@ static status join_seams(const struct directions_input *in, struct directions_ou
     status s = fiber_set_copy(&out->fiber, &out->traced, err);
     if (s == STATUS_OK) s = fiber_seam_measure(&out->fiber, &g->seam_found, err);
     if (s == STATUS_OK && in->scan->join_seams) s = fiber_seam_join(&out->fiber, &g->seam_join, err);
+    if (s == STATUS_OK) s = make_tiles(in, out, err);
     if (s == STATUS_OK) s = fiber_set_validate(&out->fiber, err);
     return s == STATUS_OK ? fiber_seam_measure(&out->fiber, &g->seam_fiber, err) : s;
 }

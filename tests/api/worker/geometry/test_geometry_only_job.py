@@ -138,3 +138,17 @@ def test_command_line_errors(real, tmp_path, monkeypatch, words, text):
 def test_documents_that_are_refused(real, document, field, text):
     reply = real.post("/v1/jobs", json={"sample": "s", **document})
     assert reply.status_code == 422 and reply.json()["field"] == field and text in reply.json()["detail"]
+
+
+def test_a_large_tile_of_several_repeats(tmp_path):
+    """A scan of two repeats along each edge: moves by half of it, and with noise perhaps by a yarn of both directions; all ends go on."""
+    subprocess.run([program("selvedge-phantom"), "cloth", "--weave", "plain", "--yarns", "4,4", "--fibers-per-yarn", "7", "--out", str(tmp_path / "cloth")],
+                   check=True, capture_output=True)
+    (tmp_path / "job/input").mkdir(parents=True)
+    os.rename(tmp_path / "cloth/scan.tif", tmp_path / "job/input/scan.tif")
+    (tmp_path / "job/job.json").write_text(json.dumps({"sample": "s", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0, "tiles": 3}}))
+    subprocess.run([program("selvedge-worker"), "--quiet", str(tmp_path / "job")], check=True, timeout=300)
+    made = json.loads((tmp_path / "job/results/result.json").read_text())
+    tiles = made["geometry"]["seam_fibers"]["tiles"]
+    assert 4 <= tiles["n_move"] <= 9 and tiles["n_cut_end"] > 100 and tiles["n_free"] < 0.1 * tiles["n_cut_end"], tiles
+    assert not [w for w in made["warnings"] if "shows no repeat" in w]
