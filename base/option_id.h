@@ -74,6 +74,8 @@
 #define OPTION_BOWL_MASK "bowl_mask"
 #define OPTION_PHOTOGRAPHS "photographs"
 #define OPTION_PHOTOGRAPH_FILE "photograph_file"
+#define OPTION_CYLINDER_RADIUS "cylinder_radius"
+#define OPTION_CYLINDER_EDGES "cylinder_edges"
 /* the fit */
 #define OPTION_MODEL "model"
 #define OPTION_METHOD "method"

@@ -162,6 +162,12 @@ bench-camera: | deps-test ## mean radiances from raw files of a simulated camera
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/camera/bench_camera.py --build $(BUILD)
 
+# CYLINDER: options of the program, such as CYLINDER="--seeds 1 --keep build/bench-cylinder"
+.PHONY: bench-cylinder
+bench-cylinder: | deps-test ## parameters from two photographs of a cylinder beside those from 16 of flat cloth (half an hour of a core)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/camera/bench_cylinder.py --build $(BUILD) $(CYLINDER)
+
 docs-pairs: | deps-test ## draw docs/images/photo-pairs.png anew: renderings of four photo pairs (10 minutes, seconds after bench-cloth)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_pairs.py --build $(BUILD) --picture docs/images/photo-pairs.png >&2

@@ -61,10 +61,19 @@ status job_check_camera(const struct option_value *v, struct error *err)
                            v->section->setup->crop_cm, v->section->setup->camera_distance_cm);
 }
 
+/* Returns whether the option belongs to a photograph of a cylinder, which lamps from below light at its sides. */
+static bool is_on_cylinder(const struct option_value *v)
+{
+    if (strncmp(v->path, "photographs[", strlen("photographs[")) != 0) return false;
+    const struct job_photograph *p = v->own;
+    return p->cylinder.radius_mm > 0.0;
+}
+
 /* A lamp behind the cloth lights it through; that needs a cloth without its black sheet. */
 status job_check_light_theta(const struct option_value *v, struct error *err)
 {
     double theta_deg = *(const double *)v->target;
+    if (is_on_cylinder(v)) return STATUS_OK;
     if (theta_deg < 90.0 || (theta_deg > 90.0 && !v->section->setup->black_sheet)) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, v->path,
                            "'%s' is %g: allowed are 0 to below 90 degrees from the normal (above 90, from behind, "
@@ -135,11 +144,27 @@ static status check_place(const struct option_value *v, size_t i, const char *wh
     *distance_cm = NAN;
     if (!position) return STATUS_OK;
     job_angles_of_position(position_mm, theta_deg, phi_deg, distance_cm);
-    bool camera = what[0] == 'c', behind = !camera && *theta_deg > 90.0 && !v->section->setup->black_sheet;
+    bool camera = what[0] == 'c', cylinder = v->section->rows->photograph[i].cylinder.radius_mm > 0.0,
+         behind = !camera && *theta_deg > 90.0 && (cylinder || !v->section->setup->black_sheet);
     if (*distance_cm >= 1.0 && (*theta_deg < (camera ? 89.999 : 90.0) || behind)) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, path, "'%s' is %s", path,
                            *distance_cm < 1.0 ? "nearer than 10 mm to the orbit center"
                                               : "not above the cloth (a lamp may be behind it without black_sheet)");
+}
+
+/* The keys of a cylinder mean nothing without its radius. */
+static status check_cylinder(const struct option_value *v, const struct job_photograph *p, struct error *err)
+{
+    static const char *const key[] = {"cylinder_axis", "cylinder_edges_px", "cylinder_length_mm", "cylinder_step_deg",
+                                      "cylinder_limit_deg"};
+    char path[JSON_PATH_BYTES];
+    for (size_t k = 0; k < sizeof key / sizeof *key && isnan(p->cylinder.radius_mm); k++) {
+        if (json_object_get(json_array_get(v->value, p->index), key[k]) == NULL) continue;
+        snprintf(path, sizeof path, "%s[%zu].%s", v->path, p->index, key[k]);
+        return error_set_field(err, STATUS_INVALID, path,
+                               "'%s' needs 'cylinder_radius_mm': the cloth is flat without it", path);
+    }
+    return STATUS_OK;
 }
 
 status job_check_photographs(const struct option_value *v, struct error *err)
@@ -149,12 +174,14 @@ status job_check_photographs(const struct option_value *v, struct error *err)
     for (size_t i = 0; i < rows->n_photograph; i++) {
         struct job_photograph *p = &rows->photograph[i];
         char path[JSON_PATH_BYTES];
+        p->index = i;
         fitted = fitted || p->set == JOB_SET_FIT;
         status s = check_place(v, i, "light", &p->light_theta_deg, &p->light_phi_deg, p->light_position_mm,
                                &p->light_distance_cm, err);
         if (s == STATUS_OK)
             s = check_place(v, i, "camera", &p->camera_theta_deg, &p->camera_phi_deg, p->camera_position_mm,
                             &p->camera_distance_cm, err);
+        if (s == STATUS_OK) s = check_cylinder(v, p, err);
         if (s != STATUS_OK) return s;
         if (p->view[0] == '\0' || v->section->setup->rig_file[0] != '\0') continue;
         snprintf(path, sizeof path, "%s[%zu].view", v->path, i);
@@ -275,7 +302,8 @@ static status check_density(const struct job_setup *setup, const struct job_rows
     bool from_behind = false;
     for (size_t i = 0; i < rows->n_photograph; i++)
         if (rows->photograph[i].set == JOB_SET_FIT &&
-            (rows->photograph[i].light_theta_deg > 90.0 || rows->photograph[i].view[0] != '\0'))
+            ((rows->photograph[i].light_theta_deg > 90.0 && !(rows->photograph[i].cylinder.radius_mm > 0.0)) ||
+             rows->photograph[i].view[0] != '\0'))
             from_behind = true; /* the rig is read later */
     if (!fit->fit_density || from_behind || (rows->n_photograph == 0 && !setup->black_sheet)) return STATUS_OK;
     return job_density_undetermined(setup->black_sheet, err);

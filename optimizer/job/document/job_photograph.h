@@ -14,6 +14,27 @@ struct job_exposure {
     double exposure_s; /* NaN: as the file states */
 };
 
+/* Where the end of a cylinder's axis at +y shows in a picture; the axis lies within 45 degrees of this side. */
+enum job_axis { JOB_AXIS_UP, JOB_AXIS_RIGHT, JOB_AXIS_DOWN, JOB_AXIS_LEFT };
+
+/* A cylinder that the cloth of a photograph is wrapped on: axis parallel to y, the highest line of the cloth through
+ * the orbit center (photographs/cylinder/cylinder_view.h). */
+struct job_cylinder {
+    double radius_mm; /* of the cloth's outer side; NaN or 0: the cloth is flat */
+    enum job_axis axis;
+    double edges_px[8];                    /* two points on each silhouette; NaN: found */
+    double markers_px[8];                  /* the same by the markers of a rig; all 0: none */
+    double step_deg, limit_deg, length_mm; /* length along the axis; NaN or 0: all of the crop */
+};
+
+/* A column of such a photograph, which the worker makes a photograph of its own of. */
+struct job_column {
+    size_t number, n;       /* from 1 on; 0: the photograph is no column. n: columns of the photograph */
+    double angle_deg;       /* around the cylinder, from the highest line towards +x */
+    double corner_px[4][2]; /* upper left, upper right, lower right, lower left of its picture, with the axis upwards */
+    double angle_se_deg;    /* by the errors of the silhouettes */
+};
+
 struct job_photograph {
     char file[JOB_MAX_NAME_BYTES];
     enum job_set set;
@@ -30,7 +51,18 @@ struct job_photograph {
     double exposure_s, iso, aperture, black_level; /* NaN: as the file states */
     size_t n_exposure;                             /* besides the first one, which is `file` */
     struct job_exposure *exposure;
+    size_t index; /* in the list of the document */
+    struct job_cylinder cylinder;
+    struct job_column column;
 };
+
+/* Returns whether the photograph shows a cylinder whose columns have not been made yet. */
+static inline bool job_photograph_is_cylinder(const struct job_photograph *p)
+{
+    return p->cylinder.radius_mm > 0.0 && p->column.number == 0;
+}
+/* The name of the row that the photograph makes: its file, of a column with the number before the ending. */
+void job_photograph_name(const struct job_photograph *p, char name[JOB_MAX_NAME_BYTES]);
 
 /* A photograph of the bowl of a single fiber. */
 struct job_bowl_photograph {

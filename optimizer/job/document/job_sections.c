@@ -77,6 +77,7 @@ void job_sections_visit_files(const struct job_sections *section,
         visit(context, section->setup->chart_reference_file, "measurements");
     if (section->setup->white.file[0] != '\0') visit(context, section->setup->white.file, "white_reference");
     for (size_t i = 0; i < section->rows->n_photograph; i++) {
+        if (section->rows->photograph[i].column.number > 1) continue; /* of the same files as the first column */
         visit(context, section->rows->photograph[i].file, "photograph");
         for (size_t j = 0; j < section->rows->photograph[i].n_exposure; j++)
             visit(context, section->rows->photograph[i].exposure[j].file, "photograph");
@@ -106,10 +107,10 @@ static void listed_file_key(const struct job_sections *section, const char *name
         if (strcmp(section->setup->dark_frame[i], name) == 0) snprintf(key, n_key, "camera.dark_frames[%zu]", i);
     for (size_t i = 0; i < section->rows->n_photograph; i++) {
         const struct job_photograph *p = &section->rows->photograph[i];
-        if (strcmp(p->file, name) == 0) snprintf(key, n_key, "photographs[%zu].file", i);
+        if (strcmp(p->file, name) == 0) snprintf(key, n_key, "photographs[%zu].file", p->index);
         for (size_t j = 0; j < p->n_exposure; j++)
             if (strcmp(p->exposure[j].file, name) == 0)
-                snprintf(key, n_key, "photographs[%zu].more_exposures[%zu].file", i, j);
+                snprintf(key, n_key, "photographs[%zu].more_exposures[%zu].file", p->index, j);
     }
     for (size_t i = 0; i < section->results->n_surface_picture; i++)
         if (strcmp(section->results->surface_picture[i].mesh_file, name) == 0)

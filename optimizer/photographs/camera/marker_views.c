@@ -5,6 +5,7 @@
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/document/job_setup.h"
+#include "optimizer/photographs/camera/cylinder_place.h"
 #include "optimizer/photographs/camera/plane_pose.h"
 #include "optimizer/photographs/reader/photograph.h"
 
@@ -141,6 +142,7 @@ status marker_view_find(const struct marker_board *board, const struct lens *len
     if (v->n_corner >= ENOUGH_CORNERS) keep_board_corners(&list);
     if (s == STATUS_OK) s = fit_map(&list, map, &v->rms_px, err);
     if (s != STATUS_OK) return s;
+    memcpy(v->map, map, sizeof v->map);
     plane_map_apply(map, origin, v->center_px);
     v->px_per_mm = plane_map_scale(map, origin);
     if (v->rms_px > largest_misfit * board->side_mm * v->px_per_mm)
@@ -156,22 +158,31 @@ status marker_view_find(const struct marker_board *board, const struct lens *len
 static status set_crop(const struct marker_view *v, double crop_cm, size_t width, size_t height,
                        struct job_photograph *p, struct error *err)
 {
-    const double half = 0.5 * 10.0 * crop_cm * v->px_per_mm, size[2] = {(double)width, (double)height};
+    const double edge_mm = p->cylinder.length_mm > 0.0 ? p->cylinder.length_mm : 10.0 * crop_cm,
+                 half = 0.5 * edge_mm * v->px_per_mm, size[2] = {(double)width, (double)height};
+    const bool cylinder = job_photograph_is_cylinder(p);
+    const size_t across = p->cylinder.axis == JOB_AXIS_UP || p->cylinder.axis == JOB_AXIS_DOWN ? 0 : 1;
     bool inside = true;
     for (size_t c = 0; c < 2; c++) {
+        if (cylinder && c == across) {
+            p->crop_px[c] = 0;
+            p->crop_px[2 + c] = c == 0 ? width : height;
+            continue;
+        }
         double from = v->center_px[c] - half, to = v->center_px[c] + half, edge = fmax(rint(to - from), 1.0);
         inside = inside && from >= 0.0 && to <= size[c] && rint(from) + edge <= size[c];
         if (!inside) break;
         p->crop_px[c] = (size_t)rint(from);
         p->crop_px[2 + c] = (size_t)(rint(from) + edge);
+        if (cylinder) continue;
         p->crop_exact_px[c] = from;
         p->crop_exact_px[2 + c] = to;
     }
     if (inside) return STATUS_OK;
     return error_set(err, STATUS_INVALID,
-                     "the crop of %g cm about the orbit center, %.0f pixels about (%.0f, %.0f), is not all in the "
+                     "the crop of %g mm about the orbit center, %.0f pixels about (%.0f, %.0f), is not all in the "
                      "picture",
-                     crop_cm, rint(2.0 * half), v->center_px[0], v->center_px[1]);
+                     edge_mm, rint(2.0 * half), v->center_px[0], v->center_px[1]);
 }
 
 status marker_view_apply(const struct marker_view *v, double crop_cm, size_t width, size_t height,
@@ -184,14 +195,15 @@ status marker_view_apply(const struct marker_view *v, double crop_cm, size_t wid
                          "the place of its camera is not given, and cannot follow from the markers without the focal "
                          "lengths of the lens ('distortion' of the rig)");
     job_angles_of_position(v->camera_mm, &p->camera_theta_deg, &p->camera_phi_deg, &p->camera_distance_cm);
+    if (job_photograph_is_cylinder(p)) return STATUS_OK;
     p->camera_phi_deg += p->cloth_rotation_deg; /* the markers turn with the cloth, the camera does not */
     if (p->camera_phi_deg > 360.0) p->camera_phi_deg -= 360.0;
     if (p->camera_phi_deg < -360.0) p->camera_phi_deg += 360.0;
     return STATUS_OK;
 }
 
-static status apply_to(const struct marker_board *board, const struct lens *lens, const char *folder, double crop_cm,
-                       struct job_photograph *p, struct error *err)
+static status apply_to(const struct marker_board *board, const struct lens *lens, const char *folder,
+                       const struct job_setup *setup, struct job_photograph *p, struct error *err)
 {
     struct job_photograph whole = *p;
     struct marker_view view;
@@ -203,7 +215,9 @@ static status apply_to(const struct marker_board *board, const struct lens *lens
     status s = photograph_read_values(path, &whole, &im, &r, err);
     if (s != STATUS_OK) return s;
     s = marker_view_find(board, lens, &im, &view, err);
-    if (s == STATUS_OK) s = marker_view_apply(&view, crop_cm, im.width, im.height, p, err);
+    if (s == STATUS_OK) s = marker_view_apply(&view, setup->crop_cm, im.width, im.height, p, err);
+    if (s == STATUS_OK && job_photograph_is_cylinder(p) && view.has_camera)
+        s = cylinder_place_by_markers(setup, view.map, lens, p, err);
     image_release(&im);
     return s == STATUS_OK ? s : error_prefix(err, s, "cannot use photograph '%s'", p->file);
 }
@@ -213,10 +227,11 @@ status marker_views_apply(const struct marker_board *board, const struct lens *l
 {
     for (size_t i = 0; i < rows->n_photograph; i++) {
         struct job_photograph *p = &rows->photograph[i];
-        bool no_camera = isnan(p->camera_theta_deg);
+        const bool no_camera = isnan(p->camera_theta_deg),
+                   no_edges = job_photograph_is_cylinder(p) && isnan(p->cylinder.edges_px[0]);
         status s = STATUS_OK;
-        if (board->n > 0 && (no_camera || p->crop_px[2] == 0))
-            s = apply_to(board, lens, folder, setup->crop_cm, p, err);
+        if (board->n > 0 && (no_camera || no_edges || p->crop_px[2] == 0))
+            s = apply_to(board, lens, folder, setup, p, err);
         else if (no_camera)
             s = error_set(
                 err, STATUS_INVALID,

@@ -18,6 +18,7 @@ struct marker_view {
     double px_per_mm;          /* at the orbit center, perpendicular to the view */
     bool has_camera;           /* the lens' focal lengths are known */
     double camera_mm[3];       /* in the frame of the cloth */
+    double map[9];             /* from the markers' plane to the picture without distortion (plane_pose.h) */
 };
 
 /* Finds the board in a picture. The corners of a chessboard are looked for where the found markers promise them,
@@ -26,11 +27,12 @@ struct marker_view {
  * picture by more than a tenth of a marker. */
 status marker_view_find(const struct marker_board *board, const struct lens *lens, const struct image *im,
                         struct marker_view *view, struct error *err);
-/* Fills in two values that photograph p leaves out: the crop of crop_cm about the orbit center, and the place of the
- * camera. */
+/* Fills in two values that photograph p leaves out: the crop of crop_cm about the orbit center (of a cylinder along its
+ * axis, with all of the picture across), and the place of the camera. */
 status marker_view_apply(const struct marker_view *view, double crop_cm, size_t width, size_t height,
                          struct job_photograph *p, struct error *err);
-/* Does both for every photograph of the document that leaves out its crop or its camera; files are in `folder`. Without
+/* Does both for every photograph of the document that leaves out its crop or its camera, and gives cylinders without
+ * edges the outline by the markers (cylinder_place.h); files are in `folder`. Without
  * a board (n 0) a photograph whose camera is not given is an error. err->field is an option id. */
 status marker_views_apply(const struct marker_board *board, const struct lens *lens, const char *folder,
                           struct job_setup *setup, struct job_rows *rows, struct error *err);

@@ -10,11 +10,6 @@
 
 #include "optimizer/photographs/camera/photograph_process.h"
 
-/* Reads the files of camera and rig that the document names; they are in `folder`. Gives photographs the angles of the
- * views that they name (rig.h), and crops and cameras by markers (marker_views.h). Errors have the option in
- * err->field. */
-status photograph_process_load(struct photograph_process *k, struct job_setup *setup, struct job_rows *rows,
-                               const char *folder, struct error *err);
 /* Develops a photograph of the job. record may be NULL. Errors as in photograph_read; STATUS_INVALID besides: the
  * errors of exposure_ratio_fit; exposures of different sizes, ISO values or f-numbers, or of unknown time; no dark
  * frame of the exposure time; a noise record of another ISO value. */

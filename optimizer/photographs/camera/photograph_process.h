@@ -1,5 +1,5 @@
 /* The job's knowledge of its camera, which turns files into radiances: dark frames, the record of its noise, rig and
- * lens, colors. Ownership: init/release; photograph_process_load (photograph_develop.h) fills it in. */
+ * lens, colors. Ownership: init/release; photograph_process_load.h fills it in. */
 #ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_PROCESS_H
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_PROCESS_H
 

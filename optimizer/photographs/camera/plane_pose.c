@@ -83,8 +83,9 @@ double plane_map_scale(const double m[9], const double p[2])
     return sqrt(0.5 * (s + sqrt(fmax(0.0, s * s - 4.0 * det * det)))); /* the larger singular value */
 }
 
-status plane_map_camera(const double m[9], const double focal_px[2], const double center_px[2], double camera[3],
-                        struct error *err)
+/* The plane's pose before the camera: axis[0] and axis[1] are its x and y, axis[2] its z, axis[3] its origin, in the
+ * camera's frame. */
+static void pose_of_map(const double m[9], const double focal_px[2], const double center_px[2], double axis[4][3])
 {
     double column[3][3], length[2] = {0};
     for (size_t k = 0; k < 3; k++) { /* the map without the lens: r1, r2, t, all with one factor */
@@ -96,11 +97,34 @@ status plane_map_camera(const double m[9], const double focal_px[2], const doubl
     }
     double factor = 2.0 / (length[0] + length[1]) * (column[2][2] < 0.0 ? -1.0 : 1.0);
     for (size_t k = 0; k < 3; k++)
-        for (size_t c = 0; c < 3; c++) column[k][c] *= factor;
-    const double *a = column[0], *b = column[1], *t = column[2];
-    double up[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-    const double *axis[3] = {a, b, up};
-    for (size_t k = 0; k < 3; k++) camera[k] = -(axis[k][0] * t[0] + axis[k][1] * t[1] + axis[k][2] * t[2]);
-    if (camera[2] > 0.0) return STATUS_OK;
+        for (size_t c = 0; c < 3; c++) axis[k < 2 ? k : 3][c] = factor * column[k][c];
+    const double *a = axis[0], *b = axis[1];
+    const double up[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    memcpy(axis[2], up, sizeof up);
+}
+
+static status refuse_mirrored(struct error *err)
+{
     return error_set(err, STATUS_INVALID, "the markers lie mirrored: their places do not fit to what the camera sees");
+}
+
+status plane_map_camera(const double m[9], const double focal_px[2], const double center_px[2], double camera[3],
+                        struct error *err)
+{
+    double axis[4][3];
+    pose_of_map(m, focal_px, center_px, axis);
+    const double *t = axis[3];
+    for (size_t k = 0; k < 3; k++) camera[k] = -(axis[k][0] * t[0] + axis[k][1] * t[1] + axis[k][2] * t[2]);
+    return camera[2] > 0.0 ? STATUS_OK : refuse_mirrored(err);
+}
+
+status plane_map_project(const double m[9], const double focal_px[2], const double center_px[2], const double p[3],
+                         double pixel[2], struct error *err)
+{
+    double axis[4][3], at[3];
+    pose_of_map(m, focal_px, center_px, axis);
+    for (size_t c = 0; c < 3; c++) at[c] = axis[3][c] + p[0] * axis[0][c] + p[1] * axis[1][c] + p[2] * axis[2][c];
+    if (!(at[2] > 0.0)) return refuse_mirrored(err);
+    for (size_t c = 0; c < 2; c++) pixel[c] = center_px[c] + focal_px[c] * at[c] / at[2];
+    return STATUS_OK;
 }

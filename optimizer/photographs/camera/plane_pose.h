@@ -18,5 +18,9 @@ double plane_map_scale(const double map[9], const double plane[2]);
  * center. STATUS_INVALID for a mirrored plane. */
 status plane_map_camera(const double map[9], const double focal_px[2], const double center_px[2], double camera[3],
                         struct error *err);
+/* Where a point (x, y, z) in the frame of the plane shows, by the same map and lens. STATUS_INVALID for a mirrored
+ * plane and for a point behind the camera. */
+status plane_map_project(const double map[9], const double focal_px[2], const double center_px[2],
+                         const double point[3], double pixel[2], struct error *err);
 
 #endif

@@ -92,7 +92,7 @@ static status apply_view(const struct json_field *rig, struct job_setup *setup, 
     if (s == STATUS_OK) s = json_field_object(rig, "cameras", &cameras, &present, err);
     if (s == STATUS_OK && !by_markers) s = read_station(&cameras, camera_name, 89.999, &camera, err);
     if (s != STATUS_OK) return s;
-    if (lamp.theta_deg >= 90.0 && (setup->black_sheet || lamp.theta_deg == 90.0))
+    if (lamp.theta_deg >= 90.0 && !job_photograph_is_cylinder(p) && (setup->black_sheet || lamp.theta_deg == 90.0))
         return error_set(
             err, STATUS_INVALID,
             "'lamps.%s' is at %g degrees from the normal: allowed are 0 to below 90 (above 90, from behind, "

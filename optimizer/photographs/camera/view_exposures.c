@@ -197,7 +197,8 @@ static status take_carried(const struct photograph_process *k, const char *folde
     for (size_t i = 0; i + 1 < set->n; i++) wanted = wanted || !isfinite(pair[i].var);
     if (!wanted || k->carry == NULL || k->rows == NULL) return STATUS_OK;
     for (size_t i = 0; i < k->rows->n_photograph && !k->carry->searched && s == STATUS_OK; i++)
-        if (k->rows->photograph[i].n_exposure > 0) s = search_view(k, folder, &k->rows->photograph[i], err);
+        if (k->rows->photograph[i].n_exposure > 0 && k->rows->photograph[i].column.number <= 1)
+            s = search_view(k, folder, &k->rows->photograph[i], err);
     k->carry->searched = s == STATUS_OK;
     exposure_carry_fill(k->carry, set, &e->record[0].info, pair);
     return s;

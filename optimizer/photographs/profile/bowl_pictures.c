@@ -1,6 +1,7 @@
 #include "optimizer/photographs/profile/bowl_pictures.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_profile.h"
+#include "optimizer/photographs/camera/photograph_process_load.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -147,25 +147,37 @@ status photograph_read(const char *path, const struct job_photograph *p, struct 
     return STATUS_OK;
 }
 
-/* Mean over all pixels, and the scatter of the means of n_block x n_block sub-blocks. */
-static void measure_channel(const struct image *im, size_t c, size_t n_block, double *mean, double *block_sd)
+/* Weight of the pixel x of a column: a cut through the weave at another phase then changes the mean little. */
+static double column_weight(const struct image *im, size_t x)
 {
-    double total = 0.0, sum = 0.0, sum2 = 0.0;
-    for (size_t by = 0; by < n_block; by++) {
-        for (size_t bx = 0; bx < n_block; bx++) {
-            size_t x0 = bx * im->width / n_block, x1 = (bx + 1) * im->width / n_block;
-            size_t y0 = by * im->height / n_block, y1 = (by + 1) * im->height / n_block;
-            double block = 0.0;
-            for (size_t y = y0; y < y1; y++)
-                for (size_t x = x0; x < x1; x++) block += (double)im->pixel[(y * im->width + x) * im->n_channel + c];
-            total += block;
-            block /= (double)((x1 - x0) * (y1 - y0));
-            sum += block;
-            sum2 += block * block;
-        }
+    return 1.0 - fabs(2.0 * ((double)x + 0.5) / (double)im->width - 1.0);
+}
+
+/* Mean over all pixels, weighted across a column, and the scatter of the means of n_block[0] x n_block[1] sub-blocks.
+ */
+static void measure_channel(const struct image *im, size_t c, const size_t n_block[2], bool is_column, double *mean,
+                            double *block_sd)
+{
+    double total = 0.0, weights = 0.0, sum = 0.0, sum2 = 0.0;
+    for (size_t i = 0; i < n_block[0] * n_block[1]; i++) {
+        const size_t bx = i % n_block[0], by = i / n_block[0];
+        const size_t x0 = bx * im->width / n_block[0], x1 = (bx + 1) * im->width / n_block[0];
+        const size_t y0 = by * im->height / n_block[1], y1 = (by + 1) * im->height / n_block[1];
+        double block = 0.0, own = 0.0;
+        for (size_t y = y0; y < y1; y++)
+            for (size_t x = x0; x < x1; x++) {
+                const double weight = is_column ? column_weight(im, x) : 1.0;
+                block += weight * (double)im->pixel[(y * im->width + x) * im->n_channel + c];
+                own += weight;
+            }
+        total += block;
+        weights += own;
+        block /= own;
+        sum += block;
+        sum2 += block * block;
     }
-    double n = (double)(n_block * n_block), block_mean = sum / n;
-    *mean = total / (double)(im->width * im->height);
+    double n = (double)(n_block[0] * n_block[1]), block_mean = sum / n;
+    *mean = total / weights;
     *block_sd = n > 1.0 ? sqrt(fmax(0.0, (sum2 - n * block_mean * block_mean) / (n - 1.0))) : 0.0;
 }
 
@@ -189,7 +201,7 @@ static void warn(const struct image *im, const char *name, struct photograph_mea
             mean->warning, n_bytes,
             "photograph '%s' is not uniform: the means of its parts scatter by %.0f %%, so one mean describes it badly",
             name, 100.0 * mean->block_contrast);
-    else if (mean->record.info.encoded && (im->width < FEW_PX || im->height < FEW_PX))
+    else if (mean->record.info.encoded && !mean->record.is_column && (im->width < FEW_PX || im->height < FEW_PX))
         snprintf(mean->warning, n_bytes,
                  "photograph '%s' has only %zu x %zu pixels of cloth: too few for a mean with a standard error", name,
                  im->width, im->height);
@@ -225,12 +237,16 @@ status photograph_measure_image(const struct image *im, const char *name, enum j
                          name, r->info.bits == 32 ? "float " : "", r->info.format);
     status s = check_pixels(im, name, err);
     if (s != STATUS_OK) return s;
-    size_t side = im->width < im->height ? im->width : im->height, n_block = side / MIN_BLOCK_PX;
-    n_block = n_block > MAX_BLOCK ? MAX_BLOCK : n_block < 1 ? 1 : n_block;
+    const size_t least = im->width < im->height ? im->width : im->height, side = r->is_column ? im->height : least,
+                 n = side / MIN_BLOCK_PX > MAX_BLOCK ? MAX_BLOCK
+                     : side / MIN_BLOCK_PX < 1       ? 1
+                                                     : side / MIN_BLOCK_PX,
+                 n_block[2] = {r->is_column ? 1 : n, n};
+    const double n_part = sqrt((double)(n_block[0] * n_block[1]));
     for (size_t c = 0; c < 3; c++) {
         double block_sd;
-        measure_channel(im, c, n_block, &mean->mean_rgb[c], &block_sd);
-        mean->se_rgb[c] = hypot(hypot(block_sd / (double)n_block, r->exposure_se_rgb[c]), photograph_color_se(r, c));
+        measure_channel(im, c, n_block, r->is_column, &mean->mean_rgb[c], &block_sd);
+        mean->se_rgb[c] = hypot(hypot(block_sd / n_part, r->exposure_se_rgb[c]), photograph_color_se(r, c));
         if (mean->mean_rgb[c] > 0.0) mean->block_contrast = fmax(mean->block_contrast, block_sd / mean->mean_rgb[c]);
     }
     const double *m = mean->mean_rgb;

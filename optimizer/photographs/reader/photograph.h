@@ -3,12 +3,11 @@
  * Reads any format of photograph_reader.h, takes the crop, divides by the exposure where it is known, multiplies by the
  * photograph's scale. The exposure is t (ISO / 100) / N^2, time t in seconds and f-number N; a factor that neither the
  * document nor the file states is 1 (photographs_check_exposure requires that all photographs state the same ones). The
- * standard error of the mean comes from the means of square sub-blocks (8 x 8 of them where the crop allows): cloth has
- * texture that is correlated from pixel to pixel, so single pixels would state an error that is far too small.
- * STATUS_FORMAT / STATUS_INVALID naming the file: unreadable, NaN or infinite pixels, negative mean, all black,
- * saturated (more than 2 % of the crop at the value where the picture is clipped), crop outside the picture, linear
- * samples that are declared as srgb.
- */
+ * standard error of the mean comes from the means of square sub-blocks (8 x 8 of them where the crop allows, 8 along a
+ * column): cloth has texture that is correlated from pixel to pixel, so single pixels would state an error that is far
+ * too small. STATUS_FORMAT / STATUS_INVALID naming the file: unreadable, NaN or infinite pixels, negative mean, all
+ * black, saturated (more than 2 % of the crop at the value where the picture is clipped), crop outside the picture,
+ * linear samples that are declared as srgb. */
 #ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_H
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_H
 
@@ -44,6 +43,8 @@ struct photograph_record {
     /* Errors of the mean of channel c by independent causes of one standard deviation each, which are the same for all
      * channels and photographs: of the color matrix and of the rounding of exposures. */
     double color_error[3][PHOTOGRAPH_CAUSES];
+    bool is_column; /* of a cylinder: light changes across it, so parts are compared along it alone, and the weights of
+                       pixels fall from the middle to both sides */
     bool resampled; /* pixels depend on their neighbours as after an enlargement or a strong filter */
 };
 

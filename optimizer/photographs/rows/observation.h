@@ -5,6 +5,7 @@
 #define SELVEDGE_OPTIMIZER_OBSERVATION_H
 
 #include "base/status.h"
+#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "renderer/scene/configuration.h"
 
@@ -26,6 +27,7 @@ struct observation {
      * the maker; NULL for other rows. */
     bool expected;
     const double *left_out_rgb;
+    struct job_column column;            /* of a cylinder; number 0: none */
     struct photograph_record photograph; /* how it was read; info.format is NULL for a row of a table */
 };
 

@@ -8,6 +8,7 @@
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/photographs/reader/photograph_contrast.h"
 #include "optimizer/photographs/rows/brdf_file.h"
+#include "optimizer/photographs/rows/column_errors.h"
 #include "optimizer/photographs/rows/measurement_table.h"
 
 #include <math.h>
@@ -71,26 +72,27 @@ struct series {
     size_t first; /* observation of the first photograph */
 };
 
-static status load_photograph(const struct series *all, const struct job_photograph *p, size_t i,
-                              struct observation_set *o, struct error *err)
+static status load_photograph(const struct series *all, const struct job_photograph *p, struct observation_set *o,
+                              struct error *err)
 {
     struct photograph_mean mean = {0};
     struct observation item = {.set = p->set, .weight = p->weight};
     struct image im;
-    snprintf(item.name, sizeof item.name, "%s", p->file);
+    job_photograph_name(p, item.name);
     status s = photograph_develop(all->process, all->folder, p, &im, &mean.record, err);
     if (s == STATUS_OK) {
-        s = photograph_measure_image(&im, p->file, p->transfer, &mean, err);
+        s = photograph_measure_image(&im, item.name, p->transfer, &mean, err);
         if (s != STATUS_OK) image_release(&im);
     }
     if (s != STATUS_OK) {
-        if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_PHOTOGRAPH_FILE "[%zu]", i);
+        if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_PHOTOGRAPH_FILE "[%zu]", p->index);
         return s;
     }
     const char *const warning[2] = {mean.warning, mean.record.exposure_warning};
     for (size_t k = 0; k < 2; k++)
         if (warning[k][0] != '\0') warning_send(all->warn, OPTION_NONE, "%s", warning[k]);
-    if (all->fit->texture_block_mm > 0.0) s = measure_texture(all->setup, all->fit, &im, &item, all->warn, err);
+    if (all->fit->texture_block_mm > 0.0 && p->column.number == 0)
+        s = measure_texture(all->setup, all->fit, &im, &item, all->warn, err);
     image_release(&im);
     if (s != STATUS_OK) return s;
     const struct exposure_reference reference =
@@ -102,6 +104,7 @@ static status load_photograph(const struct series *all, const struct job_photogr
     item.configuration = observation_configuration(all->setup, p->light_theta_deg, p->light_phi_deg,
                                                    p->camera_theta_deg, p->camera_phi_deg, p->cloth_rotation_deg);
     if (p->light_distance_cm > 0.0) item.configuration.light_distance_m = 0.01 * p->light_distance_cm;
+    item.column = p->column;
     if (p->camera_distance_cm > 0.0) item.configuration.camera_distance_m = 0.01 * p->camera_distance_cm;
     return observation_set_append(o, &item, err);
 }
@@ -184,9 +187,10 @@ status observation_set_load(const struct job_setup *setup, const struct job_rows
     const size_t first = o->n;
     const struct series all = {setup, fit, folder, process, warn, first};
     for (size_t i = 0; i < rows->n_photograph; i++) {
-        status s = load_photograph(&all, &rows->photograph[i], i, o, err);
+        status s = load_photograph(&all, &rows->photograph[i], o, err);
         if (s != STATUS_OK) return s;
     }
+    column_errors_add(o, first);
     warn_less_trustworthy(o, first, warn);
     return check_exposures(o, first, process, err);
 }

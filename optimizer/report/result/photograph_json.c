@@ -26,6 +26,13 @@ json_t *photograph_record_json(const struct photograph_record *r)
     return json;
 }
 
+json_t *photograph_column_json(const char *file, const struct job_column *k)
+{
+    if (k->number == 0) return NULL;
+    return json_pack("{s:s, s:o, s:o, s:o, s:o}", "file", file, "number", json_count(k->number), "n", json_count(k->n),
+                     "angle_deg", json_number(k->angle_deg), "angle_se_deg", json_number(k->angle_se_deg));
+}
+
 static json_t *patch_json(const struct color_chart *k, size_t i)
 {
     double rgb[3];

@@ -231,6 +231,9 @@ static json_t *row_json(const struct report *report, const struct pipeline_model
     row_pictures_put(report, picture[row_pictures_shown(report, i)], picture[i], row);
     if (o->photograph.info.format != NULL)
         json_object_set_new(row, "photograph", photograph_record_json(&o->photograph));
+    if (o->column.number > 0)
+        json_object_set_new(row, "column",
+                            photograph_column_json(report->in.photographs->photograph[i].file, &o->column));
     result_row_options(report, m, i, row);
     return row;
 }

@@ -15,6 +15,7 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/job_parse.h"
 #include "optimizer/job/options/option_key.h"
+#include "optimizer/photographs/camera/photograph_process_load.h"
 #include "optimizer/photographs/rows/observation_check.h"
 #include "optimizer/photographs/rows/observation_load.h"
 #include "optimizer/stages/fit/pipeline_cloth.h"

@@ -5,6 +5,7 @@
 #define SELVEDGE_OPTIMIZER_CAMERA_COMMANDS_H
 
 #include "base/status.h"
+#include "optimizer/job/document/job_photograph.h"
 #include "renderer/image/image.h"
 
 struct job_document;
@@ -47,5 +48,8 @@ void camera_job_release(struct camera_job *job);
 /* Draws the outline of the crop (all 0: the whole picture) into the picture, and writes it as PNG whose white is the
  * 99th percentile of the values. STATUS_IO as image_write_png. */
 status camera_write_picture(struct image *im, const size_t crop_px[4], const char *out, struct error *err);
+/* The same with the outlines of the n columns of a photograph of a cylinder. */
+status camera_write_columns(struct image *im, const struct job_photograph *column, size_t n, const char *out,
+                            struct error *err);
 
 #endif

@@ -3,6 +3,7 @@
 #include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/photographs/camera/photograph_develop.h"
+#include "optimizer/photographs/camera/photograph_process_load.h"
 #include "optimizer/report/result/photograph_json.h"
 #include "optimizer/tools/camera/camera_commands.h"
 
@@ -154,14 +155,18 @@ static json_t *row_json(const struct job_photograph *p, const struct photograph_
     json_t *color = json_array();
     for (size_t c = 0; c < 3; c++)
         json_array_append_new(color, json_number_list(m->record.color_error[c], PHOTOGRAPH_CAUSES, 1.0));
-    return json_pack("{s:s, s:o, s:o, s:o, s:[i,i,i,i], s:o, s:o, s:o}", "file", p->file, "mean_rgb",
-                     json_number_list(m->mean_rgb, 3, 1.0), "standard_error", json_number_list(m->se_rgb, 3, 1.0),
-                     "color_error", color, "crop_px", (int)p->crop_px[0], (int)p->crop_px[1], (int)p->crop_px[2],
-                     (int)p->crop_px[3], "camera_theta_deg", json_number(p->camera_theta_deg), "camera_phi_deg",
-                     json_number(p->camera_phi_deg), "photograph", photograph_record_json(&m->record));
+    json_t *row =
+        json_pack("{s:s, s:o, s:o, s:o, s:[i,i,i,i], s:o, s:o, s:o}", "file", p->file, "mean_rgb",
+                  json_number_list(m->mean_rgb, 3, 1.0), "standard_error", json_number_list(m->se_rgb, 3, 1.0),
+                  "color_error", color, "crop_px", (int)p->crop_px[0], (int)p->crop_px[1], (int)p->crop_px[2],
+                  (int)p->crop_px[3], "camera_theta_deg", json_number(p->camera_theta_deg), "camera_phi_deg",
+                  json_number(p->camera_phi_deg), "photograph", photograph_record_json(&m->record));
+    if (p->column.number > 0) json_object_set_new(row, "column", photograph_column_json(p->file, &p->column));
+    return row;
 }
 
-/* Draws the crop of p in the whole picture, as it is developed, into the folder `pictures`. */
+/* Draws the crop of p, or all columns that begin with it, in the whole picture, as it is developed, into the folder
+ * `pictures`. */
 static status write_developed(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
                               const char *pictures, struct error *err)
 {
@@ -170,10 +175,12 @@ static status write_developed(const struct photograph_process *k, const char *fo
     char path[4096];
     memset(whole.crop_px, 0, sizeof whole.crop_px);
     memset(whole.crop_exact_px, 0, sizeof whole.crop_exact_px);
+    whole.column.number = 0;
     status s = photograph_develop(k, folder, &whole, &im, NULL, err);
     if (s != STATUS_OK) return s;
     snprintf(path, sizeof path, "%s/%s.png", pictures, p->file);
-    s = camera_write_picture(&im, p->crop_px, path, err);
+    s = p->column.number > 0 ? camera_write_columns(&im, p, p->column.n, path, err)
+                             : camera_write_picture(&im, p->crop_px, path, err);
     image_release(&im);
     return s;
 }
@@ -198,9 +205,11 @@ static status preview_photograph(const struct photograph_process *k, struct prev
     struct photograph_mean mean = {0};
     struct error err = {0};
     struct image im;
+    char name[JOB_MAX_NAME_BYTES];
+    job_photograph_name(p, name);
     status s = photograph_develop(k, folder, p, &im, &mean.record, &err);
     if (s == STATUS_OK) {
-        s = photograph_measure_image(&im, p->file, p->transfer, &mean, &err);
+        s = photograph_measure_image(&im, name, p->transfer, &mean, &err);
         image_release(&im);
     }
     if (s == STATUS_OK) {
@@ -208,11 +217,13 @@ static status preview_photograph(const struct photograph_process *k, struct prev
         v->begun = true;
         exposure_rounding_state(&mean.record, &v->reference, mean.mean_rgb, mean.se_rgb);
     }
-    if (mean.record.info.format != NULL) print_mean(p->file, &mean);
+    if (mean.record.info.format != NULL) print_mean(name, &mean);
     if (s == STATUS_OK) json_array_append_new(rows, row_json(p, &mean));
     if (s != STATUS_OK) fprintf(stderr, "error: %s\n", err.text);
     struct error picture_err = {0};
-    if (v->pictures == NULL || write_developed(k, folder, p, v->pictures, &picture_err) == STATUS_OK) return s;
+    if (v->pictures == NULL || p->column.number > 1 ||
+        write_developed(k, folder, p, v->pictures, &picture_err) == STATUS_OK)
+        return s;
     if (s == STATUS_OK) fprintf(stderr, "error: %s\n", picture_err.text);
     return STATUS_INVALID;
 }

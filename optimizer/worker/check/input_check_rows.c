@@ -9,6 +9,7 @@
 #include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/document/job_sections.h"
 #include "optimizer/photographs/camera/photograph_develop.h"
+#include "optimizer/photographs/camera/photograph_process_load.h"
 #include "optimizer/photographs/profile/bowl_profile.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/photographs/rows/brdf_file.h"
@@ -55,7 +56,7 @@ static bool check_photographs(struct input_check *c, const struct photograph_pro
         if (has_files(c, p) && measure(c, process, p, &fault) == STATUS_OK) continue;
         all = false;
         if (fault.code == STATUS_OK) continue; /* a file is missing, which is a fault already */
-        snprintf(fault.field, sizeof fault.field, OPTION_PHOTOGRAPH_FILE "[%zu]", i);
+        snprintf(fault.field, sizeof fault.field, OPTION_PHOTOGRAPH_FILE "[%zu]", p->index);
         input_check_fault(c, &fault);
     }
     return all;

@@ -4,6 +4,7 @@
 #include "optimizer/job/document/job_rows.h"
 #include "optimizer/photographs/camera/marker_views.h"
 #include "optimizer/photographs/camera/photograph_develop.h"
+#include "optimizer/photographs/camera/photograph_process_load.h"
 #include "optimizer/photographs/camera/plane_pose.h"
 #include "tests/support/scratch_folder.h"
 

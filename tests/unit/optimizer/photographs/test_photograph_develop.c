@@ -4,6 +4,7 @@
 #include "optimizer/job/job_parse.h"
 #include "optimizer/photographs/camera/color_matrix.h"
 #include "optimizer/photographs/camera/noise_calibrate.h"
+#include "optimizer/photographs/camera/photograph_process_load.h"
 #include "optimizer/photographs/rows/observation_load.h"
 #include "optimizer/tools/simulated_camera/dng_file.h"
 #include "tests/support/camera_files.h"

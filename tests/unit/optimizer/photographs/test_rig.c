@@ -1,6 +1,7 @@
 /* The rig file, positions in millimetres, and the errors of a lens. */
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_rows.h"
+#include "optimizer/photographs/camera/photograph_process_load.h"
 #include "optimizer/photographs/camera/rig.h"
 #include "optimizer/photographs/rows/observation_load.h"
 #include "tests/support/scratch_folder.h"
