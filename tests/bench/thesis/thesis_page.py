@@ -62,6 +62,8 @@ def grazing(found):
         for model, name in (("volume", "volume"), ("microflake", "microflakes")):
             cross = found[fabric, model, "cross"]
             row = [sum(cross["grazing"]) / 2 if cross else None] + over_true(found, fabric, model)
+            if all(v is None for v in row):
+                continue
             lines.append(f"| {fabric.capitalize()}, {name} | " + " | ".join(MISSING if v is None else f"{v:.2f}" for v in row) + " |")
     return "\n".join(lines)
 
@@ -109,11 +111,16 @@ def meshes(found):
 
 
 def highlight(found, name):
-    """Brightest part of the columns under the lamp at 126 degrees over their mean under the lamp at 10, over the default's."""
+    """Brightest part of the columns under the lamp at 126 degrees over their mean under the lamp at 10, over the default's; error by tracing."""
     def of(step):
-        return max(sum(b[:3]) for b in step["columns"][3]) / (brightness(step["columns"][0]) / len(step["columns"][0]))
+        brightest = max(step["columns"][3], key=lambda b: sum(b[:3]))
+        level = sum(brightest[:3])
+        return level / (brightness(step["columns"][0]) / len(step["columns"][0])), math.hypot(*brightest[3:]) / level
     step, default = found["chain", name], found["chain", "default"]
-    return f"{of(step) / of(default):.2f}" if step and default else MISSING
+    if not step or not default:
+        return MISSING
+    (value, se), (of_default, default_se) = of(step), of(default)
+    return f"{value / of_default:.2f} +- {value / of_default * math.hypot(se, default_se):.2f}"
 
 
 def difference(step, other):
