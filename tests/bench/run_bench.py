@@ -59,8 +59,8 @@ def bench_service(build):
 
 
 # Those with a target of their own, the shortest first.
-TARGETS = ["bench-house", "bench-glints", "bench-dashboard", "bench-pile", "bench-sheared", "bench-tiles", "bench-exact", "bench-exports", "bench-scale", "bench-progress",
-           "bench-pictures", "bench-recovery", "bench-cylinder", "bench-thesis", "bench-model-tables", "bench-cloth"]
+TARGETS = ["bench-house", "bench-glints", "bench-dashboard", "bench-pile", "bench-sheared", "bench-tiles", "bench-exact", "bench-exports", "bench-scale",
+           "bench-progress", "bench-pictures", "bench-recovery", "bench-cylinder", "bench-thesis", "bench-model-tables", "bench-cloth"]
 
 
 def bench_targets():

@@ -121,14 +121,15 @@ static status cut_all(struct work *w, struct error *err)
 }
 
 /* Cuts the blocks, joins them, and replaces the fibers. */
-static status assemble(struct work *w, struct fiber_set *f, struct fiber_tiles *tiles, struct error *err)
+static status assemble(const struct work *of, struct fiber_set *f, struct fiber_tiles *tiles, struct error *err)
 {
     struct tile_lines lines = {0}, out = {0};
     struct tile_ends ends = {0};
-    const double tile_m[2] = {(double)w->cuts.n * w->cuts.tile_m[0], (double)w->cuts.n * w->cuts.tile_m[1]};
-    w->lines = &lines;
+    struct work w = *of;
+    const double tile_m[2] = {(double)w.cuts.n * w.cuts.tile_m[0], (double)w.cuts.n * w.cuts.tile_m[1]};
+    w.lines = &lines;
     status s = tile_lines_init(&lines, err);
-    if (s == STATUS_OK) s = cut_all(w, err);
+    if (s == STATUS_OK) s = cut_all(&w, err);
     if (s == STATUS_OK) s = tile_ends_make(&ends, &lines, f, tile_m, tiles, err);
     if (s == STATUS_OK) {
         tile_ends_join(&ends, &lines, tiles);

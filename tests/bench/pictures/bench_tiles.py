@@ -39,8 +39,10 @@ def rendered(build, name, tiles):
     about = read_json(cloth, "phantom.json")
     edge_mm = about["result"]["tile_mm"][0]
     view = {"light_theta_deg": 50, "light_phi_deg": 30, "samples": 12}
-    pictures = [{"on": "flat", "size_mm": 8 * edge_mm, "width_mm": BLOCKS * edge_mm, "camera_theta_deg": 0, "camera_phi_deg": 270, "px": BLOCKS * PX_A_TILE, **view},
-                {"on": "drape", "size_mm": 12 * edge_mm, "radius_mm": 3 * edge_mm, "width_mm": 12 * edge_mm, "camera_theta_deg": 45, "camera_phi_deg": 250, "px": 512, **view}]
+    flat = {"on": "flat", "size_mm": 8 * edge_mm, "width_mm": BLOCKS * edge_mm, "camera_theta_deg": 0, "camera_phi_deg": 270, "px": BLOCKS * PX_A_TILE}
+    drape = {"on": "drape", "size_mm": 12 * edge_mm, "width_mm": 12 * edge_mm, "radius_mm": 3 * edge_mm, "camera_theta_deg": 45,
+             "camera_phi_deg": 250, "px": 512}
+    pictures = [{**flat, **view}, {**drape, **view}]
     results = os.path.join(folder, "results")
     if not os.path.exists(os.path.join(results, "result.json")):
         os.makedirs(os.path.join(folder, "input"), exist_ok=True)
