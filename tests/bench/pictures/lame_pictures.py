@@ -44,9 +44,9 @@ def main():
     p = argparse.ArgumentParser()
     p.add_argument("--build", required=True)
     p.add_argument("--out", required=True)
-    p.add_argument("--frames", type=int, default=10)
-    p.add_argument("--px", type=int, default=176)
-    p.add_argument("--samples", type=int, default=4)
+    p.add_argument("--frames", type=int, default=16)
+    p.add_argument("--px", type=int, default=256)
+    p.add_argument("--samples", type=int, default=48)
     a = p.parse_args()
     folder = os.path.join(a.build, "lame-pictures")
     os.makedirs(os.path.join(folder, "input"), exist_ok=True)
@@ -58,8 +58,8 @@ def main():
         with open(os.path.join(folder, "results", "pictures", f"on-{k + 1}.exr"), "rb") as f:
             width, height, pixel = read_exr(f.read())
         frames.append(np.array([[pixel(x, y) for x in range(width)] for y in range(height)], dtype=np.float32))
-    grey = [np.minimum(x.mean(axis=2), 4).ravel() for x in frames]
-    scale = 1 / np.percentile(np.concatenate(grey), 97)
+    grey = [np.minimum(x.mean(axis=2), 8).ravel() for x in frames]
+    scale = 1 / np.percentile(np.concatenate(grey), 99.3)
     pictures = [Image.fromarray((255 * srgb(scale * x) + 0.5).astype(np.uint8)) for x in frames]
     for quality in (80, 70, 60, 50, 40, 30):
         pictures[0].save(a.out, "WEBP", save_all=True, append_images=pictures[1:], duration=110, loop=0, quality=quality, method=6)
