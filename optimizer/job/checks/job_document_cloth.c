@@ -157,12 +157,40 @@ static struct json_field field_of(const json_t *section, int kind)
     return f;
 }
 
+/* Refuses keys of films or sequins without the one that says that there are any, and waves on surfaces without them. */
+static status check_film_keys(const struct json_field *f, const char *prefix, const char *size_key, struct error *err)
+{
+    char path[JSON_PATH_BYTES], key[32];
+    const char *name;
+    json_t *value;
+    json_object_foreach((json_t *)f->object, name, value)
+    {
+        if (strncmp(name, prefix, strlen(prefix)) != 0 || json_object_get(f->object, size_key) != NULL) continue;
+        json_field_path(f, name, path);
+        return error_set_field(err, STATUS_INVALID, path, "'%s' changes nothing without '%s'", path, size_key);
+    }
+    snprintf(key, sizeof key, "%soptics", prefix);
+    const char *optics = json_string_value(json_object_get(f->object, key));
+    json_field_path(f, key, path);
+    snprintf(key, sizeof key, "%ssurface", prefix);
+    const char *surface = json_string_value(json_object_get(f->object, key));
+    if (optics == NULL || strcmp(optics, film_optics_names[FILM_RAYS]) == 0) return STATUS_OK;
+    if (surface == NULL) surface = film_surface_names[FILM_SMOOTH];
+    if (strcmp(surface, film_surface_names[FILM_SMOOTH]) != 0 && strcmp(surface, film_surface_names[FILM_FLAKES]) != 0)
+        return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, path, "'%s' is '%s': the surface '%s' is not rendered by waves", path,
+                           optics, surface);
+}
+
 static status read_numbers(const json_t *section, struct cloth_description *d, struct error *err)
 {
     status st = STATUS_OK;
     for (int k = -1; k < (int)d->n_kind && st == STATUS_OK; k++) {
         struct json_field f = field_of(section, k);
         if (f.object != NULL) st = check_surplus(&f, k, d, err);
+        if (f.object != NULL && st == STATUS_OK)
+            st = k < 0 ? check_film_keys(&f, "sequin_", "sequin_diameter_um", err)
+                       : check_film_keys(&f, "film_", "film_width_um", err);
     }
     for (size_t i = 0; i < d->n_number && st == STATUS_OK; i++) {
         struct json_field f = field_of(section, d->number[i].kind);

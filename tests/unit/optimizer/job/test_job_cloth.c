@@ -198,6 +198,18 @@ static void test_what_would_have_no_effect(void **state)
                              "no plies");
     job_document_check_error(CLOTH("\"weave\":\"velvet\",\"yarns\":[{},{\"melange_with\":0}]"),
                              "cloth.yarns[1].melange_with", "of one kind");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"film_metal\":\"gold\"}]"),
+                             "cloth.yarns[0].film_metal", "without 'film_width_um'");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"sequin_tilt_deg\":5"), "cloth.sequin_tilt_deg",
+                             "without 'sequin_diameter_um'");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"film_width_um\":90,\"film_optics\":\"r_ghs\"}]"),
+                             "cloth.yarns[0].film_optics", "'smooth' is not rendered by waves");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"sequin_diameter_um\":3000,\"sequin_surface\":\"flakes\","
+                                   "\"sequin_optics\":\"ohs\""),
+                             "cloth.sequin_optics", "'flakes' is not rendered by waves");
+    job_document_free(job_document_of_text(
+        CLOTH("\"weave\":\"plain\",\"yarns\":[{\"film_width_um\":90,\"film_optics\":\"r_ghs\",\"film_surface\":"
+              "\"noise\"}]")));
 }
 
 static void test_sizes_of_drafts(void **state)
