@@ -91,8 +91,10 @@ void profile_page(const struct report *report, size_t i, FILE *out)
     fputs("<table>\n", out);
     if (isfinite(f->nrmse))
         fprintf(out, "<tr><td>residual, of the range of the radiances</td><td>%.2f %%</td></tr>\n", 100.0 * f->nrmse);
-    fprintf(out, "<tr><td>relative residual</td><td>%.2f %%</td></tr>\n", 100.0 * f->rel_rms);
-    fprintf(out, "<tr><td>of it misfit, beyond stated errors</td><td>%.2f %%</td></tr>\n", 100.0 * f->misfit);
+    fprintf(out, "<tr><td>residual relative to the radiance, or to 2 %% of the brightest</td><td>%.2f %%</td></tr>\n",
+            100.0 * f->rel_rms);
+    fprintf(out, "<tr><td>misfit that the weights contain, beyond stated errors</td><td>%.2f %%</td></tr>\n",
+            100.0 * f->misfit);
     if (isfinite(f->chi_square))
         fprintf(out, "<tr><td>squared residuals over stated variances</td><td>%.3g</td></tr>\n", f->chi_square);
     fprintf(out, "<tr><td>scale</td><td>%.5g%s</td></tr>\n", f->scale, f->scale_se > 0.0 ? "" : ", as stated");

@@ -14,6 +14,8 @@ enum { ITERATIONS_OF_START = 8, DEFAULT_ITERATIONS = 40, MISFIT_ROUNDS = 4, MOST
 /* The relative misfit that weighs the values before the residuals are known, and the part of the mean radiance that is
  * added to each value, so that a dark one does not count for much. */
 static const double first_misfit = 0.1, dark_part = 0.02;
+/* Relative residuals and errors, as reported, are shares of at least this part of the brightest radiance. */
+static const double least_part = 0.02;
 /* Change of the misfit, over it, below which another round would not change the weights. */
 static const double same_misfit = 0.02;
 
@@ -22,7 +24,7 @@ static const double same_misfit = 0.02;
 static status target_values(struct profile_target *t, struct error *err)
 {
     const struct fiber_profile *p = t->problem->profile;
-    double mean = 0.0;
+    double mean = 0.0, most = 0.0;
     t->measured = calloc(t->n_value, sizeof *t->measured);
     t->base = calloc(t->n_value, sizeof *t->base);
     if (t->measured == NULL || t->base == NULL)
@@ -30,7 +32,9 @@ static status target_values(struct profile_target *t, struct error *err)
     for (size_t i = 0; i < t->n_value; i++) {
         t->measured[i] = p->row[i / p->n_channel].radiance[i % p->n_channel];
         mean += t->measured[i] / (double)t->n_value;
+        most = fmax(most, t->measured[i]);
     }
+    t->least = least_part * most;
     for (size_t i = 0; i < t->n_value; i++) t->base[i] = fmax(t->measured[i], 0.0) + dark_part * mean;
     return STATUS_OK;
 }
@@ -161,11 +165,14 @@ static void run_start(void *context, size_t k, size_t i_thread)
     report_start(&all->start[k], 1.0);
 }
 
+/* The radiance that the residual and the error of a value are relative to. */
+static double relative_to(const struct profile_target *t, size_t i) { return fmax(t->base[i], t->least); }
+
 static double rel_rms_of(const struct profile_target *t, const double *value)
 {
     double sum = 0.0;
     for (size_t i = 0; i < t->n_value; i++) {
-        const double r = (value[i] - t->measured[i]) / t->base[i];
+        const double r = (value[i] - t->measured[i]) / relative_to(t, i);
         sum += r * r;
     }
     return sqrt(sum / (double)t->n_value);
@@ -251,7 +258,7 @@ static void put_residuals(const struct profile_search *s, struct profile_fit *fi
     for (size_t i = 0; i < t->n_value; i++) {
         const double r = s->here.value[i] - t->measured[i];
         sum += r * r;
-        if (p->has_se) stated += pow(p->row[i / p->n_channel].se[i % p->n_channel] / t->base[i], 2.0);
+        if (p->has_se) stated += pow(p->row[i / p->n_channel].se[i % p->n_channel] / relative_to(t, i), 2.0);
         fit->bic += r * r / (s->error[i] * s->error[i]) + 2.0 * log(s->error[i]);
         least = fmin(least, t->measured[i]);
         most = fmax(most, t->measured[i]);

@@ -27,9 +27,11 @@ struct profile_fit {
     double turn_rad, turn_se_rad; /* 0 <= turn_rad < pi; se 0 for a given turn; has_turn false: there is none */
     double *value;                /* s L of every row and channel; the caller frees it with profile_fit_release */
     size_t n_value, n_free;       /* unknowns: parameters, the turn and the scale */
-    double nrmse;      /* root mean square of s L - m over the range of m, as published; NaN without a range */
-    double rel_rms;    /* root mean square of (s L - m) / (m + 0.02 mean of m) */
-    double stated_rms; /* root mean square of se / (m + 0.02 mean of m); 0 without stated errors */
+    double nrmse; /* root mean square of s L - m over the range of m, as published; NaN without a range */
+    /* Root mean squares of (s L - m) / b and of se / b, the latter 0 without stated errors. b is the larger one of
+     * m + 0.02 mean of m and 0.02 times the largest m, so that a profile that is mostly dark is not judged by its
+     * dark radiances alone. */
+    double rel_rms, stated_rms;
     double misfit;     /* t */
     double chi_square; /* the minimised sum without priors and with t = 0, per value less unknown; NaN without se */
     double bic;        /* sum of ((s L - m) / e)^2 + 2 ln e over all values, plus n_free ln n_value */

@@ -16,6 +16,7 @@ struct profile_target {
     size_t mode; /* of profile_work */
     bool fixed[PROFILE_MAX_UNKNOWN];
     double *measured, *base; /* m, and max(m, 0) + 0.02 mean of m; one of each value */
+    double least;            /* 2 % of the largest m (profile_problem.h) */
 };
 
 /* A place of a search. */

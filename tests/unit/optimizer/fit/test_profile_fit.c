@@ -134,6 +134,18 @@ static void colors_and_near_field(void **unused)
     }
 }
 
+/* The residual as the fit weighs it, for each radiance less unknown: a share of m + 0.02 mean of m. */
+static double weighted_residual(const struct fit_case *f, const struct profile_fit *fit)
+{
+    double mean = 0, square = 0;
+    for (size_t i = 0; i < f->profile.n; i++) mean += f->profile.row[i].radiance[0] / (double)f->profile.n;
+    for (size_t i = 0; i < f->profile.n; i++) {
+        const double m = f->profile.row[i].radiance[0];
+        square += pow((fit->value[i] - m) / (fmax(m, 0) + 0.02 * mean), 2);
+    }
+    return sqrt(square / (double)(f->profile.n - fit->n_free));
+}
+
 /* Without stated errors, and by a model that does not describe the fiber: what is left is misfit, and the errors that
  * contain it are larger than those of the noise. */
 static void misfit(void **unused)
@@ -152,8 +164,8 @@ static void misfit(void **unused)
     for (size_t i = 0; i < f.profile.n; i++) f.profile.row[i].se[0] = 0;
     run(&f, &unstated);
     assert_true(isnan(unstated.chi_square) && unstated.misfit > 0);
-    const double left = unstated.rel_rms * sqrt((double)f.profile.n / (double)(f.profile.n - unstated.n_free));
-    assert_true(fabs(unstated.misfit / left - 1) < 0.02); /* where the weights count as settled */
+    assert_true(fabs(unstated.misfit / weighted_residual(&f, &unstated) - 1) <
+                0.02); /* where the weights count as settled */
     for (size_t p = 0; p < f.model->n_param; p++)
         assert_true(fabs(unstated.param[p] - f.truth[p]) < 5 * unstated.se_param[p]);
     profile_fit_release(&own);
@@ -186,6 +198,34 @@ static void rows_of_large_errors_do_not_choose(void **unused)
     assert_true(own.rel_rms > wrong.rel_rms && own.bic < wrong.bic - 100);
     profile_fit_release(&own);
     profile_fit_release(&wrong);
+    end(&f);
+}
+
+/* A profile that is dark but for a few radiances, with stated errors of 1 % of the brightest: what a measurement allows
+ * and what is left are shares of 2 % of the brightest at least, so the former is
+ * below 1/2, where shares of 2 % of the mean, 0.0007 of the brightest, are about 14. */
+static void dark_profiles_are_judged_by_their_highlights(void **unused)
+{
+    enum { N_BRIGHT = 8 };
+    struct fit_case f;
+    struct profile_fit fit;
+    double square = 0, stated = 0;
+    (void)unused;
+    begin(&f, "isotropic.v1", 1, 1);
+    for (size_t i = 0; i < f.profile.n; i++) {
+        f.profile.row[i].radiance[0] = i < N_BRIGHT ? 1 : i % 2 == 0 ? 0.01 : 0;
+        f.profile.row[i].se[0] = 0.01;
+    }
+    run(&f, &fit);
+    const double n = (double)f.profile.n, mean = (N_BRIGHT + 0.005 * (n - N_BRIGHT)) / n;
+    for (size_t i = 0; i < f.profile.n; i++) {
+        const double m = f.profile.row[i].radiance[0], base = fmax(m + 0.02 * mean, 0.02);
+        square += pow((fit.value[i] - m) / base, 2) / n;
+        stated += pow(f.profile.row[i].se[0] / base, 2) / n;
+    }
+    assert_true(fabs(fit.stated_rms / sqrt(stated) - 1) < 1e-9 && fabs(fit.rel_rms / sqrt(square) - 1) < 1e-9);
+    assert_true(fit.stated_rms < 0.5);
+    profile_fit_release(&fit);
     end(&f);
 }
 
@@ -334,6 +374,7 @@ int main(void)
                                        cmocka_unit_test(misfit),
                                        cmocka_unit_test(priors_and_bounds),
                                        cmocka_unit_test(rows_of_large_errors_do_not_choose),
+                                       cmocka_unit_test(dark_profiles_are_judged_by_their_highlights),
                                        cmocka_unit_test(ties_of_a_grey_profile),
                                        cmocka_unit_test(cancelled_soon),
                                        cmocka_unit_test(turns_count_by_their_width),
