@@ -109,9 +109,9 @@ def test_the_table_alone(folder):
     lines = (folder / "p.csv").read_text().splitlines()
     assert lines[0] == "theta_i_deg,phi_i_deg,theta_o_deg,phi_deg,radiance,radiance_se" and len(lines) > 150
     true, values = SCALE * ALBEDO / math.pi**2 * math.cos(math.radians(THETA_I)), [list(map(float, line.split(","))) for line in lines[1:]]
-    squares = sum(((v[3] - true) / v[4])**2 for v in values) / len(values)
+    squares = sum(((v[4] - true) / v[5])**2 for v in values) / len(values)
     assert 1 - 4 * math.sqrt(2 / len(values)) < squares < 18 / 16 + 4 * math.sqrt(2 / len(values))
-    assert all(v[0] == THETA_I and 0 < v[2] < 180 for v in values)
+    assert all(v[0] == THETA_I and 0 < v[3] < 180 for v in values)
     assert (folder / "p.png").read_bytes()[:4] == b"\x89PNG"
     (folder / "other.json").write_text(json.dumps({"sample": "s", "profile": {"file": "p.csv"}, "fit": {"model": "isotropic.v1"}}))
     assert run(folder / "other.json", "--out", folder / "q.csv").returncode == 1
