@@ -57,6 +57,14 @@ static const char *const with_speckle[] = {
 #define MODEL_HAS_SPECKLE(name) surface_##name##_id,
 #include "base/catalogue/models.def"
 };
+#undef MODEL_HAS_SPECKLE
+#define MODEL_HAS_SPECKLE(...)
+
+static const char *const with_modes[] = {
+#undef MODEL_HAS_MODES
+#define MODEL_HAS_MODES(name) surface_##name##_id,
+#include "base/catalogue/models.def"
+};
 
 const struct model_info *model_catalogue_at(size_t i)
 {
@@ -79,6 +87,18 @@ bool model_catalogue_has_speckle(const char *id)
 {
     for (size_t i = 0; i < sizeof with_speckle / sizeof *with_speckle; i++)
         if (strcmp(with_speckle[i], id) == 0) return true;
+    return false;
+}
+
+const char *model_catalogue_with_modes(size_t i)
+{
+    return i < sizeof with_modes / sizeof *with_modes ? with_modes[i] : NULL;
+}
+
+bool model_catalogue_has_modes(const char *id)
+{
+    for (size_t i = 0; i < sizeof with_modes / sizeof *with_modes; i++)
+        if (strcmp(with_modes[i], id) == 0) return true;
     return false;
 }
 

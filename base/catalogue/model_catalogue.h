@@ -45,6 +45,9 @@ const struct model_nesting *model_catalogue_nesting(size_t i);
  * it. */
 const char *model_catalogue_with_speckle(size_t i);
 bool model_catalogue_has_speckle(const char *id);
+/* The same of models that can have the light of one mode alone (renderer/scattering/scattering.h). */
+const char *model_catalogue_with_modes(size_t i);
+bool model_catalogue_has_modes(const char *id);
 /* The id of the i-th near field that has a far field, NULL behind the last, and the id of a model's far field: the mean
  * over the width of the fiber with the same parameters (model_row.h). NULL: the model has none. */
 const char *model_catalogue_near_field(size_t i);

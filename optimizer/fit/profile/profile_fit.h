@@ -29,7 +29,7 @@ size_t profile_fit_starts(const struct fit_option *option);
 size_t profile_fit_bytes(const struct fiber_profile *profile, size_t n_param, size_t n_start);
 
 /* STATUS_INVALID with the field OPTION_PROFILE_FILE for fewer values than unknowns, OPTION_PROFILE_MODE for a mode that
- * the model does not have alone; STATUS_CANCELLED; errors of
+ * the model does not have alone, which the check of a job document refuses first; STATUS_CANCELLED; errors of
  * fit_layout_init and of the model. */
 status profile_fit_run(const struct profile_problem *problem, const char *table_name, struct profile_fit *fit,
                        struct error *err);

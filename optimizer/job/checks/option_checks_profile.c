@@ -33,6 +33,20 @@ static status check_keys(const json_t *section, const char *before, const char *
     return STATUS_OK;
 }
 
+/* Each model of the job can have the mode that the profile shows alone. */
+static status check_mode(const struct job_sections *section, struct error *err)
+{
+    const char *mode = job_profile_mode(section->profile);
+    for (size_t i = 0; i < section->fit->n_model && mode != NULL; i++) {
+        const char *id = section->fit->model[i].id;
+        if (!model_catalogue_has_modes(id))
+            return error_set_field(err, STATUS_INVALID, "profile.mode",
+                                   "'profile.mode' is '%s', but model '%s' has all modes together: '%s' has them apart",
+                                   mode, id, model_catalogue_with_modes(0));
+    }
+    return STATUS_OK;
+}
+
 status job_check_profile_document(const struct option_value *v, struct error *err)
 {
     static const char *const of_document[] = {"sample", "profile", "fit", NULL},
@@ -49,7 +63,7 @@ status job_check_profile_document(const struct option_value *v, struct error *er
             s = error_set_field(err, STATUS_INVALID, "fit.models",
                                 "'%s' is a model of a cloth as a volume: a profile needs a model of fibers",
                                 v->section->fit->model[i].id);
-    return s;
+    return s == STATUS_OK ? check_mode(v->section, err) : s;
 }
 
 status job_check_profile(const struct option_value *v, struct error *err)

@@ -195,11 +195,22 @@ def test_tables_that_are_refused(tmp_path, text, says):
     ({**DOCUMENT, "fibers": {"file": "a.hair"}}, "fibers"), ({**DOCUMENT, "black_sheet": True}, "black_sheet"),
     ({**DOCUMENT, "fit": {"model": "microflake.v1"}}, "fit.models"), ({**DOCUMENT, "fit": {"path_budget": 5000}}, "fit.path_budget"),
     ({**DOCUMENT, "profile": {"file": "a.csv", "mode": "E"}}, "profile.mode"),
+    ({**DOCUMENT, "profile": {"file": "a.csv", "mode": "TRT"}}, "profile.mode"),
     ({**DOCUMENT, "profile": {"file": "a.csv", "theta_i_deg": 95}}, "profile.theta_i_deg"), ({**DOCUMENT, "profile": {}}, "profile.file"),
     ({**DOCUMENT, "fit": {"fixed": {"C_R": 0.1, "C_TT": 0.5}, "model": "two_lobe.v1", "bounds": {"beta_R": [9, 3]}}}, "fit.bounds.beta_R"),
 ])
 def test_documents_that_are_refused(real, document, field):
     assert problem(real.post("/v1/jobs", json=document), 422, "invalid", field)
+
+
+def test_a_mode_that_the_model_lacks_is_found_by_a_check(real, tmp_path):
+    document = {**DOCUMENT, "profile": {"file": "fiber.csv", "mode": "TT"}, "fit": {"models": ["elliptical_oriented.v1", "fur.v1"]}}
+    fault = next(f for f in real.post("/v1/check", json=document).json()["errors"] if f["field"] == "profile.mode")
+    assert "fur.v1" in fault["detail"]
+    (tmp_path / "fiber.csv").write_text(table())
+    (tmp_path / "job.json").write_text(json.dumps(document))
+    done = subprocess.run([program("selvedge"), "check", str(tmp_path / "job.json")], capture_output=True, text=True, timeout=60)
+    assert done.returncode != 0 and "profile.mode" in done.stdout + done.stderr, done.stdout + done.stderr
 
 
 def test_command_line_and_python(real, tmp_path):

@@ -80,6 +80,7 @@ static void registries_follow_the_catalogue(void **unused)
         assert_string_equal(s ? (*surface)->title : (*volume)->title, m->title);
         assert_ptr_equal(s ? (*surface)->param : (*volume)->param, m->param);
         assert_int_equal(s ? (*surface)->n_param : (*volume)->n_param + 1, m->n_param);
+        assert_int_equal(model_catalogue_has_modes(m->id), s && (*surface)->mode != NULL);
         if (s)
             surface++;
         else

@@ -299,6 +299,19 @@ static void test_raw_volume(void **state)
                              "volume.raw.order", "order");
 }
 
+#define PROFILE(mode, models)                                                                                          \
+    "{\"sample\":\"s\",\"profile\":{\"file\":\"p.csv\",\"mode\":\"" mode "\"},\"fit\":{\"models\":[" models "]}}"
+
+/* A mode alone needs a model that has modes apart, which each model of the job must be. */
+static void test_mode_of_profile(void **state)
+{
+    (void)state;
+    job_document_free(job_document_of_text(PROFILE("TRT", "\"elliptical_oriented.v1\"")));
+    job_document_free(job_document_of_text(PROFILE("all", "\"fur.v1\",\"isotropic.v1\"")));
+    job_document_check_error(PROFILE("TRT", "\"elliptical_oriented.v1\",\"fur.v1\""), "profile.mode", "'fur.v1'");
+    job_document_check_error(PROFILE("R", "\"elliptical.v1\""), "profile.mode", "'elliptical_oriented.v1' has");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -307,7 +320,7 @@ int main(void)
         cmocka_unit_test(test_volume),        cmocka_unit_test(test_alignment),
         cmocka_unit_test(test_photographs),   cmocka_unit_test(test_file_names),
         cmocka_unit_test(test_damage),        cmocka_unit_test(test_stage_weights),
-        cmocka_unit_test(test_raw_volume),
+        cmocka_unit_test(test_raw_volume),    cmocka_unit_test(test_mode_of_profile),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
