@@ -238,7 +238,7 @@ gallery: | deps-test ## make the pictures of docs/gallery.md anew: six fabrics i
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/pictures/gallery.py --build $(BUILD) --out docs/images/gallery $(GALLERY)
 
-docs-lame: | deps-test ## make docs/images/{lame.webp,sequins.jpg} anew: a drape of lame under a lamp that goes around, and sequins (half an hour of a core; kept in build)
+docs-lame: | deps-test ## make docs/images/{lame.webp,sequins.jpg} anew: a drape of lame under a lamp that goes around, and sequins (ten minutes of a core; kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/pictures/lame_pictures.py --build $(BUILD) --out docs/images/lame.webp
 	@/usr/bin/python3 tests/bench/pictures/sequin_picture.py --build $(BUILD) --out docs/images/sequins.jpg

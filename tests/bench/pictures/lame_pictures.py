@@ -21,6 +21,8 @@ except ImportError:
     sys.exit("the animation needs python3-pil")
 
 MOST_BYTES = 1_400_000
+SKY = 0.2  # radiance all around, in which the metal shows its color between the glints
+GROUND = 0.6  # what it becomes in the picture, in linear light
 CLOTH = {"weave": "twill31", "warp": [0], "weft": [1], "tile_warps": 8, "tile_wefts": 8, "crimp": 0.2, "cover_weft": 0.9,
          "yarns": [{"fibers": 20, "fiber_radius_um": 9, "twist_per_m": 400},
                    {"film_width_um": 300, "film_thickness_um": 12, "film_metal": "gold", "film_roughness": 0.3, "film_surface": "flakes",
@@ -28,15 +30,15 @@ CLOTH = {"weave": "twill31", "warp": [0], "weft": [1], "tile_warps": 8, "tile_we
 
 
 def document(frames, px, samples):
-    view = {"on": "drape", "radius_mm": 10, "size_mm": 40, "width_mm": 46, "camera_theta_deg": 50, "camera_phi_deg": 250, "light_theta_deg": 45,
+    view = {"on": "drape", "radius_mm": 10, "size_mm": 40, "width_mm": 38, "camera_theta_deg": 50, "camera_phi_deg": 250, "light_theta_deg": 45,
             "px": px, "samples": samples, "black_sheet": True}
-    return {"sample": "lame", "cloth": CLOTH, "environment": {"radiance": [0.03, 0.03, 0.03]},
+    return {"sample": "lame", "cloth": CLOTH, "environment": {"radiance": [SKY, SKY, SKY]},
             "pictures": [{**view, "light_phi_deg": 360 * k / frames} for k in range(frames)],
             "fit": {"model": "two_lobe.v1", "fixed": {"C_R": 0.03, "C_TT": [0.15, 0.03, 0.08], "beta_R": 6, "beta_TT": 14, "gamma_TT": 24}}}
 
 
 def srgb(x):
-    x = np.clip(x, 0, 1)
+    x = np.maximum(x, 0) / np.maximum(x.max(axis=2, keepdims=True), 1)  # bright glints keep their hue
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
 
 
@@ -44,9 +46,9 @@ def main():
     p = argparse.ArgumentParser()
     p.add_argument("--build", required=True)
     p.add_argument("--out", required=True)
-    p.add_argument("--frames", type=int, default=16)
-    p.add_argument("--px", type=int, default=256)
-    p.add_argument("--samples", type=int, default=48)
+    p.add_argument("--frames", type=int, default=14)
+    p.add_argument("--px", type=int, default=288)
+    p.add_argument("--samples", type=int, default=32)
     a = p.parse_args()
     folder = os.path.join(a.build, "lame-pictures")
     os.makedirs(os.path.join(folder, "input"), exist_ok=True)
@@ -59,8 +61,7 @@ def main():
             width, height, pixel = read_exr(f.read())
         frames.append(np.array([[pixel(x, y) for x in range(width)] for y in range(height)], dtype=np.float32))
     grey = [np.minimum(x.mean(axis=2), 8).ravel() for x in frames]
-    scale = 1 / np.percentile(np.concatenate(grey), 99.3)
-    pictures = [Image.fromarray((255 * srgb(scale * x) + 0.5).astype(np.uint8)) for x in frames]
+    pictures = [Image.fromarray((255 * srgb(GROUND / SKY * x) + 0.5).astype(np.uint8)) for x in frames]
     for quality in (80, 70, 60, 50, 40, 30):
         pictures[0].save(a.out, "WEBP", save_all=True, append_images=pictures[1:], duration=110, loop=0, quality=quality, method=6)
         if os.path.getsize(a.out) <= MOST_BYTES:
