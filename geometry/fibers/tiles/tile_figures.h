@@ -5,10 +5,11 @@
 #include <stddef.h>
 
 struct fiber_tiles {
-    size_t n_move;    /* moves that look alike, with none at all: 1: the tile shows no repeat, and stays as it is */
+    size_t n_move;    /* moves after which the tile looks like itself, the zero move included; 1: it shows no repeat
+                         and stays as it is; 0: no large tile was asked for */
     size_t n_cut_end; /* ends that the cuts have made, without those that meet as they are */
-    size_t n_free;    /* ends of these without a partner: they end within the cloth */
-    double move_m;    /* mean distance by which joined ends were moved; NaN without any */
+    size_t n_free;    /* cut ends without a partner, which end within the cloth */
+    double move_m;    /* mean distance by which joined ends were moved; NaN if there are none */
 };
 
 #endif

@@ -17,7 +17,7 @@ void tile_view_make(struct tile_view *v, const struct fiber_set *f);
 double tile_view_difference(const struct tile_view *v, const double a_m[2], const double b_m[2]);
 /* Finds moves after which the tile looks like itself: local minima of the mean difference, below 0.7 of its mean over
  * all moves and before the widest step of their differences, at least an eighth of the tile apart, at most
- * TILE_VIEW_MOST_MOVES. The first is none at all. Returns how many. */
+ * TILE_VIEW_MOST_MOVES. The first is the zero move. Returns how many there are. */
 size_t tile_view_moves(const struct tile_view *v, double move_m[TILE_VIEW_MOST_MOVES][2]);
 
 #endif

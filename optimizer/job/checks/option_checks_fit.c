@@ -235,6 +235,15 @@ static status check_cells(const struct job_results *results, const json_t *given
     return STATUS_OK;
 }
 
+/* Returns the rays of a pixel along an axis of a preview; 0: the samples are no square, or too many. */
+static size_t preview_side(size_t sample)
+{
+    const size_t most = 8; /* RAY_MAX_SIDE */
+    for (size_t side = 1; side <= most; side++)
+        if (side * side == sample) return side;
+    return 0;
+}
+
 /* What a lens and a preview of the smooth surface do not go with. */
 static status check_preview(const struct job_setup *setup, const struct job_surface_picture *p, const json_t *given,
                             size_t i, struct error *err)
@@ -251,6 +260,9 @@ static status check_preview(const struct job_setup *setup, const struct job_surf
          "blurs"},
         {!lens && !isnan(p->focus_mm), "focus_mm", "there is no 'aperture_mm'"},
         {sheared && p->filter, "filter", "the method \"sheared\" filters already"},
+        {sheared && preview_side(p->sample) == 0, "samples",
+         "the method \"sheared\" takes a square of them, up to 64: 1, 4, 9, 16, 25, 36, 49 or 64"},
+        {sheared && p->px > JOB_MAX_PREVIEW_PX, "px", "the method \"sheared\" takes at most 2048"},
         {!sheared && json_object_get(given, "preview_filter") != NULL, "preview_filter", "'method' is not \"sheared\""},
     };
     for (size_t k = 0; k < sizeof row / sizeof *row; k++) {

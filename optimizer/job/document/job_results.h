@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { JOB_MAX_SURFACE_PICTURE = 32, JOB_MAX_EXPORT = 16 };
+enum { JOB_MAX_SURFACE_PICTURE = 32, JOB_MAX_PREVIEW_PX = 2048, JOB_MAX_EXPORT = 16 };
 
 /* How a picture is rendered: JOB_PICTURE_PATH and so forth, a value for each row of picture_methods.def. */
 enum job_picture_method {

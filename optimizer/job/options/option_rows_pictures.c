@@ -205,8 +205,8 @@ const struct job_option option_rows_pictures[] = {
      .choice = preview_filter_names,
      .standard = "\"passes\"",
      .meaning =
-         "Of method `sheared`, which takes up to 64 `samples`: four `passes`; for comparison one `whole` sum, means "
-         "along `axes`, or `none`."},
+         "Of method `sheared`, whose `samples` are 1, 4, 9 up to 64: four `passes`; for comparison one `whole` sum, "
+         "means along `axes`, or `none`."},
     {.path = "pictures[].speckle",
      .kind = OPTION_BOOL,
      OF_PICTURE(speckle),

@@ -21,8 +21,7 @@ status surface_preview_render(const struct report *report, size_t i, const struc
                                     .stream = q->stream};
     struct image im;
     const double before_s = process_use().cpu_s;
-    while (request.n_side < RAY_MAX_SIDE && (request.n_side + 1) * (request.n_side + 1) <= q->n_sample)
-        request.n_side++;
+    while (request.n_side < RAY_MAX_SIDE && request.n_side * request.n_side < q->n_sample) request.n_side++;
     status s = proxy_picture_render(&request, report->in.job->tools->pool, progress, &im, err);
     if (s != STATUS_OK) return s;
     memcpy(so_far->image.pixel, im.pixel, im.width * im.height * im.n_channel * sizeof *im.pixel);

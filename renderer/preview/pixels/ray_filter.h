@@ -5,8 +5,9 @@
  * Sheared filtering counts the ray of a neighbour at x' to the place y' as one of the pixel's own to the place
  * y = y' + eta (x' - x), with a Gaussian weight of x' - x (equations 2.23 to 2.25; sheared_filter.h for a misprint).
  * Axis-aligned filtering takes means of pixels (Mehta, Wang and Ramamoorthi 2012) with a Gaussian of half |s_min| / 6,
- * where s_min is the slope nearest to 0 (their k = 3 and mu = 1). Pixels whose slopes have both signs have no shear and
- * are filtered by axes.
+ * where s_min is the slope nearest to 0 (their k = 3 and mu = 1). Pixels whose slopes have both signs have no shear:
+ * the four passes give them the mean of their own rays, and the other filters the narrowest Gaussian, of a quarter of
+ * a pixel.
  */
 #ifndef SELVEDGE_RENDERER_RAY_FILTER_H
 #define SELVEDGE_RENDERER_RAY_FILTER_H

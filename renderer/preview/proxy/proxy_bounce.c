@@ -6,7 +6,6 @@
 
 struct run {
     const struct proxy_surface *s;
-    const struct progress *progress;
     struct proxy_layers *l;
     struct ray_field field;
 };
@@ -70,8 +69,9 @@ static void axes_at(const struct proxy_surface *s, const struct proxy_place *p, 
     }
 }
 
-static void sample_pixel(struct run *r, size_t i)
+static void sample_pixel(void *context, size_t i)
 {
+    struct run *r = context;
     struct ray_field *f = &r->field;
     const struct proxy_place *p = &r->l->place[i];
     struct ray_pixel *to = &f->pixel[i];
@@ -96,30 +96,16 @@ static void sample_pixel(struct run *r, size_t i)
         }
 }
 
-static void sample_row(void *context, size_t y, size_t i_thread)
-{
-    (void)i_thread;
-    struct run *r = context;
-    const size_t width = r->s->q->width;
-    for (size_t x = 0; x < width && !progress_cancelled(r->progress); x++) sample_pixel(r, y * width + x);
-}
-
 status proxy_bounce_make(const struct proxy_surface *s, struct thread_pool *pool, const struct progress *progress,
                          struct proxy_layers *l, struct error *err)
 {
-    struct run r = {.s = s, .progress = progress, .l = l};
+    struct run r = {.s = s, .l = l};
     if (s->q->no_bounce) return STATUS_OK;
     status st = ray_field_init(&r.field, s->q->width, s->q->height, s->q->n_side, 3, err);
     r.field.window = RAY_ABOVE;
     r.field.half = 5;
-    struct progress_part part[2] = {{progress, 0.0, 0.6}, {progress, 0.6, 0.4}};
-    struct progress inner[2] = {progress_of_part(&part[0]), progress_of_part(&part[1])};
-    if (st == STATUS_OK) {
-        st = thread_pool_run(pool, s->q->height, sample_row, &r, &inner[0]);
-        if (st != STATUS_OK) error_set(err, st, "making a preview was cancelled");
-    }
-    if (st == STATUS_OK) st = ray_field_smooth_slopes(&r.field, err);
-    if (st == STATUS_OK) st = ray_filter(&r.field, s->q->way, pool, &inner[1], l->bounce, err);
+    const struct proxy_rays rays = {&r.field, s->q->way, sample_pixel, &r};
+    if (st == STATUS_OK) st = proxy_rays_filter(&rays, pool, progress, l->bounce, err);
     ray_field_release(&r.field);
     return st;
 }

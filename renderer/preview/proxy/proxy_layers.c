@@ -101,3 +101,29 @@ bool proxy_layers_receiver(const struct proxy_surface *s, const struct proxy_pla
     }
     return true;
 }
+
+struct sampling {
+    const struct proxy_rays *rays;
+    const struct progress *progress;
+};
+
+static void sample_row(void *context, size_t y, size_t i_thread)
+{
+    (void)i_thread;
+    const struct sampling *s = context;
+    const struct proxy_rays *rays = s->rays;
+    const size_t width = rays->field->width;
+    for (size_t x = 0; x < width && !progress_cancelled(s->progress); x++) rays->sample(rays->context, y * width + x);
+}
+
+status proxy_rays_filter(const struct proxy_rays *rays, struct thread_pool *pool, const struct progress *progress,
+                         float *mean, struct error *err)
+{
+    struct sampling sampling = {rays, progress};
+    struct progress_part part[2] = {{progress, 0.0, 0.6}, {progress, 0.6, 0.4}};
+    struct progress inner[2] = {progress_of_part(&part[0]), progress_of_part(&part[1])};
+    status st = thread_pool_run(pool, rays->field->height, sample_row, &sampling, &inner[0]);
+    if (st != STATUS_OK) return error_set(err, st, "making a preview was cancelled");
+    st = ray_field_smooth_slopes(rays->field, err);
+    return st == STATUS_OK ? ray_filter(rays->field, rays->way, pool, &inner[1], mean, err) : st;
+}

@@ -23,6 +23,18 @@ typedef void proxy_axes(const struct proxy_surface *s, const struct proxy_place 
 bool proxy_layers_receiver(const struct proxy_surface *s, const struct proxy_place *p, size_t i_pixel, proxy_axes *at,
                            struct ray_pixel *r);
 
+/* The rays of one layer. `sample` writes rays, jitter and slopes of a pixel of the field; it runs on any thread. */
+struct proxy_rays {
+    struct ray_field *field;
+    enum ray_filter_way way;
+    void (*sample)(void *context, size_t i_pixel);
+    void *context;
+};
+/* Samples all pixels, smooths their slopes, and writes mean[height][width][n_channel] as ray_filter does.
+ * STATUS_NO_MEMORY, STATUS_CANCELLED. */
+status proxy_rays_filter(const struct proxy_rays *rays, struct thread_pool *pool, const struct progress *progress,
+                         float *mean, struct error *err);
+
 /* Share of the lamp's light that comes to pixels, through other layers of the cloth, too. Without a lamp it is 1. */
 status proxy_shadow_make(const struct proxy_surface *s, struct thread_pool *pool, const struct progress *progress,
                          struct proxy_layers *l, struct error *err);

@@ -11,7 +11,6 @@ enum { EXTRA_RAYS = 36 };
 struct run {
     const struct proxy_surface *s;
     const struct proxy_layers *l;
-    const struct progress *progress;
     struct ray_field field;
     bool lens;
 };
@@ -103,8 +102,9 @@ static void see(const struct run *r, size_t i, const double lens[2], struct rng 
     if (r->lens) ray_pixel_meet(to, (float)((distance * distance / depth - distance / focus) / r->s->pixel_mm));
 }
 
-static void sample_pixel(struct run *r, size_t i)
+static void sample_pixel(void *context, size_t i)
 {
+    struct run *r = context;
     struct ray_field *f = &r->field;
     struct ray_pixel *to = &f->pixel[i];
     const double radius = r->s->camera.lens_mm;
@@ -132,29 +132,15 @@ static void sample_pixel(struct run *r, size_t i)
     for (size_t j = 0; j < n; j++) memcpy(f->value + (i * n + j) * 3, sum, sizeof sum);
 }
 
-static void sample_row(void *context, size_t y, size_t i_thread)
-{
-    (void)i_thread;
-    struct run *r = context;
-    const size_t width = r->s->q->width;
-    for (size_t x = 0; x < width && !progress_cancelled(r->progress); x++) sample_pixel(r, y * width + x);
-}
-
 status proxy_lens_make(const struct proxy_surface *s, const struct proxy_layers *l, struct thread_pool *pool,
                        const struct progress *progress, float *rgb, struct error *err)
 {
-    struct run r = {.s = s, .progress = progress, .l = l, .lens = s->camera.lens_mm > 0.0};
+    struct run r = {.s = s, .l = l, .lens = s->camera.lens_mm > 0.0};
     status st = ray_field_init(&r.field, s->q->width, s->q->height, s->q->n_side, 3, err);
     r.field.window = r.lens ? RAY_GAUSSIAN : RAY_SQUARE;
     r.field.half = r.lens ? (float)s->camera.lens_mm : 1;
-    struct progress_part part[2] = {{progress, 0.0, 0.6}, {progress, 0.6, 0.4}};
-    struct progress inner[2] = {progress_of_part(&part[0]), progress_of_part(&part[1])};
-    if (st == STATUS_OK) {
-        st = thread_pool_run(pool, s->q->height, sample_row, &r, &inner[0]);
-        if (st != STATUS_OK) error_set(err, st, "making a preview was cancelled");
-    }
-    if (st == STATUS_OK && r.lens) st = ray_field_smooth_slopes(&r.field, err);
-    if (st == STATUS_OK) st = ray_filter(&r.field, r.lens ? s->q->way : RAY_OWN, pool, &inner[1], rgb, err);
+    const struct proxy_rays rays = {&r.field, r.lens ? s->q->way : RAY_OWN, sample_pixel, &r};
+    if (st == STATUS_OK) st = proxy_rays_filter(&rays, pool, progress, rgb, err);
     ray_field_release(&r.field);
     return st;
 }

@@ -6,7 +6,6 @@
 
 struct run {
     const struct proxy_surface *s;
-    const struct progress *progress;
     struct proxy_layers *l;
     struct ray_field field;
 };
@@ -72,8 +71,9 @@ static void look(const struct run *r, const struct proxy_place *p, const double 
         ray_pixel_meet(to, (float)slope_of(s, p->hit.position_mm, hit.position_mm));
 }
 
-static void sample_pixel(struct run *r, size_t i)
+static void sample_pixel(void *context, size_t i)
 {
+    struct run *r = context;
     struct ray_field *f = &r->field;
     const struct proxy_place *p = &r->l->place[i];
     struct ray_pixel *to = &f->pixel[i];
@@ -96,34 +96,19 @@ static void sample_pixel(struct run *r, size_t i)
         }
 }
 
-static void sample_row(void *context, size_t y, size_t i_thread)
-{
-    (void)i_thread;
-    struct run *r = context;
-    const size_t width = r->s->q->width;
-    for (size_t x = 0; x < width && !progress_cancelled(r->progress); x++) sample_pixel(r, y * width + x);
-}
-
 status proxy_shadow_make(const struct proxy_surface *s, struct thread_pool *pool, const struct progress *progress,
                          struct proxy_layers *l, struct error *err)
 {
     const struct lamp *lamp = &s->lights.lamp;
     const size_t n = s->q->width * s->q->height;
-    struct run r = {.s = s, .progress = progress, .l = l};
+    struct run r = {.s = s, .l = l};
     for (size_t i = 0; i < 3 * n; i++) l->visible[i] = 1;
     if (!s->lights.has_lamp) return STATUS_OK;
     status st = ray_field_init(&r.field, s->q->width, s->q->height, lamp->directional ? 1 : s->q->n_side, 3, err);
     r.field.window = lamp->distant ? RAY_GAUSSIAN : RAY_SQUARE;
     r.field.half = lamp->directional ? 1e-6f : lamp->distant ? 2 / sqrtf(lamp->sharpness) : lamp->half_side_mm;
-    struct progress_part part[2] = {{progress, 0.0, 0.6}, {progress, 0.6, 0.4}};
-    struct progress inner[2] = {progress_of_part(&part[0]), progress_of_part(&part[1])};
-    if (st == STATUS_OK) {
-        st = thread_pool_run(pool, s->q->height, sample_row, &r, &inner[0]);
-        if (st != STATUS_OK) error_set(err, st, "making a preview was cancelled");
-    }
-    if (st == STATUS_OK) st = ray_field_smooth_slopes(&r.field, err);
-    if (st == STATUS_OK)
-        st = ray_filter(&r.field, lamp->directional ? RAY_OWN : s->q->way, pool, &inner[1], l->visible, err);
+    const struct proxy_rays rays = {&r.field, lamp->directional ? RAY_OWN : s->q->way, sample_pixel, &r};
+    if (st == STATUS_OK) st = proxy_rays_filter(&rays, pool, progress, l->visible, err);
     ray_field_release(&r.field);
     return st;
 }

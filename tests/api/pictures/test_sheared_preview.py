@@ -37,7 +37,8 @@ def test_a_preview_is_near_the_paths(tmp_path):
 
 @pytest.mark.parametrize("changed,field", [
     ({"aperture_mm": 5, "ground_gap_mm": 1}, "aperture_mm"), ({"aperture_mm": 5, "filter": True}, "filter"),
-    ({"focus_mm": 900}, "focus_mm"), ({"method": "sheared", "filter": True}, "filter"), ({"preview_filter": "axes"}, "preview_filter")])
+    ({"focus_mm": 900}, "focus_mm"), ({"method": "sheared", "filter": True}, "filter"), ({"preview_filter": "axes"}, "preview_filter"),
+    ({"method": "sheared", "samples": 17}, "samples"), ({"method": "sheared", "samples": 81}, "samples"), ({"method": "sheared", "px": 2049}, "px")])
 def test_what_does_not_go_together_is_refused(real, changed, field):
     """By the name of the option."""
     given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "fit": FIT, "pictures": [{"on": "flat", **VIEW, **changed}]}
