@@ -1,15 +1,18 @@
-"""Configurations, parameters and the error of make bench-thesis (tests/bench/thesis)."""
+"""Configurations, parameters, the error and the steps of make bench-thesis (tests/bench/thesis)."""
 import json
 import os
 import random
 import subprocess
 import sys
 
+import pytest
+
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 BUILD = os.environ.get("SELVEDGE_BUILD", os.path.join(ROOT, "build"))
 sys.path.insert(0, os.path.join(ROOT, "tests", "bench", "thesis"))
 import thesis_fabrics  # noqa: E402
 import thesis_fits  # noqa: E402
+import thesis_jobs  # noqa: E402
 
 
 def test_configurations_are_as_many_as_printed():
@@ -43,3 +46,33 @@ def test_error_has_no_bias_by_noise():
     mean = sum(squares) / len(squares)
     se = (sum((s - mean) ** 2 for s in squares) / len(squares) / (len(squares) - 1)) ** 0.5
     assert abs(mean - 0.01) < 4 * se and se < 0.005
+
+
+def test_a_stopped_step_goes_on_and_an_old_program_is_told(tmp_path, capsys):
+    """A worker in its place that fails at first, leaves a mark, and then writes down whether it found the mark."""
+    worker = tmp_path / "bin/selvedge-worker"
+    worker.parent.mkdir()
+
+    def install(version):
+        worker.write_text(f"#!/bin/sh\ncd $2\nif [ -e mark ]; then found=true; else found=false; fi\n: > mark; echo log > log.txt\n"
+                          f'[ -e ../stop ] && exit 1\nmkdir -p results; echo "{{\\"version\\": {version}, \\"found\\": $found}}" > results/result.json\n')
+        worker.chmod(0o755)
+        return thesis_jobs.Steps(str(tmp_path), str(tmp_path / "steps"), [])
+
+    def job(steps, document="d"):
+        return steps.job("fit.one", document, {}, lambda result, _: result)
+    steps = install(1)
+    (tmp_path / "steps/stop").touch()
+    with pytest.raises(RuntimeError):
+        job(steps)
+    assert steps.kept("fit.one") is None
+    (tmp_path / "steps/stop").unlink()
+    assert job(steps) == {"version": 1, "found": True}
+    assert steps.kept("fit.one")["cpu_s"] is None, "the time of the stopped run is not known"
+    assert steps.standing()[1] == 0 and "another program" not in capsys.readouterr().err
+    steps = install(2)
+    assert job(steps)["version"] == 1
+    assert steps.standing()[1] == 1 and "1 of 1 steps are of another program: fit.one" in capsys.readouterr().err
+    (tmp_path / "steps/fit.one.json").unlink()
+    assert job(steps) == {"version": 2, "found": False}, "what the old program left is not gone on with"
+    assert job(steps, "another") == {"version": 2, "found": False} and steps.kept("fit.one")["cpu_s"] is not None

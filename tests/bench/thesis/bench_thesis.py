@@ -6,7 +6,8 @@
                                     the same of a volume model that is fitted to the truth of the fibers
 
 STEP: beginnings of names of steps, such as "fit.silk"; the others are taken as far as they are finished. Results are kept in
-DIR/bench-thesis, one JSON file a step, so that an interrupted run goes on. --page: also writes the page from them.
+DIR/bench-thesis, one JSON file a step, so that an interrupted run goes on; steps that an older program made are named on standard error.
+--page: also writes the page from them.
 """
 import argparse
 import json
@@ -67,8 +68,9 @@ def main():
     build = os.path.abspath(a.build)
     steps = Steps(build, os.path.join(build, "bench-thesis"), a.steps)
     found = {**fits(steps), **pictures(steps)}
+    standing = steps.standing()
     if a.page:
-        write_page(found, a.page)
+        write_page(found, standing, a.page)
 
 
 main()

@@ -155,21 +155,25 @@ def stripe(found, what):
     return f"{new[what] / old[what]:.2f}" if new and old else MISSING
 
 
-def machine():
+def machine(days, n_other):
+    """days, n_other: as Steps.standing."""
     with open("/proc/cpuinfo", encoding="utf-8") as f:
         name = re.search(r"model name\s*: (.*)", f.read())
-    return f"{datetime.date.today().isoformat()}, {os.cpu_count()} cores of {'an ' + name[1].split('(')[0] if name else 'a processor'} beside other work."
+    programs = f", {n_other + 1} versions of the program" if n_other else ""
+    return (f"{' to '.join(days) or datetime.date.today().isoformat()}{programs}, {os.cpu_count()} cores of "
+            f"{'an ' + name[1].split('(')[0] if name else 'a processor'} beside other work.")
 
 
-def values(found):
+def values(found, standing):
     inside, counted, others = recovered(found)
     own = [found[fabric, model] for fabric in NAMES for model in MODELS if found[fabric, model]]
+    timed = [f["cpu_s"] for f in own if f["cpu_s"] is not None]
     cross = {m: [found[f, m, "cross"] for f in NAMES if found[f, m, "cross"]] for m in ("volume", "microflake")}
     text = {"fits": fits(found), "grazing": grazing(found), "within": inside, "counted": counted, "others": others,
             "gamma": gammas(found), "mesh": meshes(found),
-            "fit_cpu": f"{sum(f['cpu_s'] for f in own) / max(1, len(own)):.0f}",
+            "fit_cpu": f"{sum(timed) / len(timed):.0f}" if timed else MISSING,
             "density": listed([d and d["heldout"] for d in (found["density", d] for d in (4000, 2000, 1000))], "{:.3f}"),
-            "contrast": stripe(found, "contrast"), "stripes_mean": stripe(found, "mean"), "machine": machine(),
+            "contrast": stripe(found, "contrast"), "stripes_mean": stripe(found, "mean"), "machine": machine(*standing),
             "scatter_two_lobe": span([found[f, "two_lobe"]["of_rows"][0] for f in NAMES if found[f, "two_lobe"]], "{:.3f}"),
             "grazing_range": span([v for fit in cross["microflake"] for v in fit["grazing"]])}
     for model, of in cross.items():
@@ -183,10 +187,10 @@ def values(found):
     return {**text, **fast(found), **kept_figures()}
 
 
-def write_page(found, path):
+def write_page(found, standing, path):
     with open(os.path.join(HERE, "page.txt"), encoding="utf-8") as f:
         page = f.read()
-    of = values(found)
+    of = values(found, standing)
     page = re.sub(r"\{([a-z_]+)\}", lambda m: str(of[m[1]]), page)
     with open(path, "w", encoding="utf-8") as f:
         f.write(page)

@@ -6,6 +6,7 @@ they repeat figures 5.22 to 5.26 with pictures of the true fibers in place of ph
 import csv
 import math
 import os
+import shutil
 import subprocess
 import sys
 
@@ -120,10 +121,11 @@ SCAN = ["--weave", "plain", "--fibers-per-yarn", "19", "--diameter-voxel", "6", 
 CHAIN = {"default": {}, "no_transfer": {"transfer_directions": False}, "subvolumes": {"three_subvolumes": True}}
 
 
-def make_scan(steps):
-    folder = os.path.join(steps.folder, "scan-files")
-    subprocess.run([os.path.join(steps.build, "bin", "selvedge-phantom"), "cloth", "--out", folder, *SCAN], check=True, stdout=sys.stderr)
-    return os.path.join(folder, "scan.tif")
+def make_scan(steps, folder):
+    """The scan comes under its name when it is whole."""
+    subprocess.run([os.path.join(steps.build, "bin", "selvedge-phantom"), "cloth", "--out", folder + ".new", *SCAN], check=True, stdout=sys.stderr)
+    shutil.rmtree(folder, ignore_errors=True)
+    os.rename(folder + ".new", folder)
 
 
 def take_chain(result, folder):
@@ -132,9 +134,10 @@ def take_chain(result, folder):
 
 
 def chain(steps, name):
-    scan = os.path.join(steps.folder, "scan-files", "scan.tif")
+    folder = os.path.join(steps.folder, "scan" + "".join(SCAN).replace("--", "-"))  # steps depend on its name
+    scan = os.path.join(folder, "scan.tif")
     if not os.path.exists(scan) and steps.wanted(f"chain.{name}"):
-        make_scan(steps)
+        make_scan(steps, folder)
     views = [{**CYLINDER, "light_theta_deg": a, "px": 48, "samples": 40} for a in ANGLES]
     job = {"sample": f"steps of the published chain: {name}", "volume": {"files": ["scan.tif"], "voxel_size_um": 2, "radius_um": 6, **CHAIN[name]},
            "fit": {"model": MODELS["volume"], "fixed": {**flat(truth("silk", "volume"))}}, "pictures": views}
