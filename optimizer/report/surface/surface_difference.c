@@ -11,6 +11,9 @@ struct means {
     bool lit;
 };
 
+/* A variance; 0 for one that is not known. */
+static double known(float variance) { return isnan(variance) ? 0.0 : (double)variance; }
+
 static struct means means_of(const struct image *a, const struct image *b, size_t x0, size_t y0, size_t width,
                              size_t height)
 {
@@ -23,7 +26,7 @@ static struct means means_of(const struct image *a, const struct image *b, size_
                 const float *q = b->pixel + (y * b->width + x) * b->n_channel + k;
                 m.reference[k] += (double)q[0] / n;
                 m.difference[k] += ((double)p[0] - (double)q[0]) / n;
-                m.variance[k] += ((double)p[N_RGB] + (double)q[N_RGB]) / (n * n);
+                m.variance[k] += (known(p[N_RGB]) + known(q[N_RGB])) / (n * n);
                 m.lit = m.lit || p[0] > 0.0f || q[0] > 0.0f;
             }
     return m;

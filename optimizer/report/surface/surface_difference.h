@@ -13,7 +13,8 @@ struct surface_difference {
     double field_noise;         /* the noise that was subtracted */
 };
 
-/* Both pictures have the same size and six channels: radiance in rgb, and its variance. */
+/* Both pictures have the same size and six channels: radiance in rgb, and its variance. Variances that are not known
+ * (NaN, as of a preview) count as 0: field_rms then holds the noise of that picture, too. */
 void surface_difference_of(const struct image *picture, const struct image *reference, struct surface_difference *out);
 
 #endif

@@ -86,12 +86,28 @@ static void noise_is_taken_off(void **unused)
     free(a.pixel), free(b.pixel);
 }
 
+/* A preview does not state its variances: the noise of the reference alone, sqrt(v / 16) over the brightness 2, is
+ * taken off the differences of .5, 1 and 1.5. */
+static void variances_that_are_not_known(void **unused)
+{
+    (void)unused;
+    const double variance = 0.04;
+    struct image a = picture(1.5, NAN), b = picture(1.0, variance);
+    struct surface_difference d;
+    surface_difference_of(&a, &b, &d);
+    assert_true(fabs(d.field_noise - sqrt(variance / 16.0) / 2.0) < 1e-6);
+    assert_true(fabs(d.field_rms - sqrt((0.25 + 1.0 + 2.25) / 3.0 - variance / 16.0) / 2.0) < 1e-6);
+    assert_true(fabs(d.mean_se[0] - sqrt(variance) / EDGE / 2.0) < 1e-6);
+    free(a.pixel), free(b.pixel);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_factor_without_noise),
         cmocka_unit_test(fields_in_the_dark_do_not_count),
         cmocka_unit_test(noise_is_taken_off),
+        cmocka_unit_test(variances_that_are_not_known),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
