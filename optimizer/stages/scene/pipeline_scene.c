@@ -7,6 +7,7 @@
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/document/job_setup.h"
+#include "optimizer/job/options/option_key.h"
 #include "optimizer/stages/made_cloth.h"
 #include "renderer/scene/scene_ray.h"
 
@@ -128,6 +129,11 @@ status made_cloth_make_scene(const struct cloth_job *job, struct made_cloth *mad
         direction_volume_release(&made->direction);
         s = voxelise(job, made, err);
     }
+    if (made->geometry.tiles.n_move > 1)
+        worker_status_warn(job->tools->status,
+                           "the large tile of '%s' is made of fibers: volume models see the voxels of the scan, one "
+                           "block of it",
+                           job_option_key(OPTION_TILES));
     return s == STATUS_OK ? make_volume_scene(job, made, err) : s;
 }
 

@@ -152,3 +152,10 @@ def test_a_large_tile_of_several_repeats(tmp_path):
     tiles = made["geometry"]["seam_fibers"]["tiles"]
     assert 4 <= tiles["n_move"] <= 9 and tiles["n_cut_end"] > 100 and tiles["n_free"] < 0.1 * tiles["n_cut_end"], tiles
     assert not [w for w in made["warnings"] if "shows no repeat" in w]
+    picture = {"on": "flat", "px": 8, "samples": 1, "light_theta_deg": 30, "light_phi_deg": 0, "camera_theta_deg": 0, "camera_phi_deg": 0}
+    document = json.loads((tmp_path / "job/job.json").read_text())
+    document.update({"fit": {"model": "phase_isotropic.v1", "fixed": {"alpha": [0.9, 0.9, 0.9]}}, "pictures": [picture]})
+    (tmp_path / "job/job.json").write_text(json.dumps(document))
+    subprocess.run([program("selvedge-worker"), "--quiet", str(tmp_path / "job")], check=True, timeout=300)
+    warnings = json.loads((tmp_path / "job/results/result.json").read_text())["warnings"]
+    assert [w for w in warnings if "'volume.tiles'" in w and "voxels of the scan" in w], warnings
