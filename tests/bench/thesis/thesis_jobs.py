@@ -61,8 +61,8 @@ class Steps:
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         print(f"{name}: processor {cpu_s:.1f} s, {time.monotonic() - start:.0f} s", file=sys.stderr, flush=True)
-        made = datetime.date.today().isoformat()
-        self.used[name] = self.keep(name, {"key": mark, "program": self.program, "made": made, "cpu_s": None if self.resumed else round(cpu_s, 1), "value": value})
+        self.used[name] = self.keep(name, {"key": mark, "program": self.program, "made": datetime.date.today().isoformat(),
+                                           "cpu_s": None if self.resumed else round(cpu_s, 1), "value": value})
         return value
 
     def standing(self):
