@@ -48,3 +48,13 @@ def test_every_figure_is_on_the_page():
     patterns = re.findall(r"^@table (\S+)", read(write_page.READINGS), re.M)
     missing = [name for name in write_page.read_figures() if not any(write_page.expression(p).fullmatch(name) for p in patterns)]
     assert not missing
+
+
+def test_unusual_machines_are_named():
+    def page_of(*machines):
+        return write_page.table({f"a.{i}": {"name": f"a.{i}", "value": 1, "unit": "1", "date": "2030-01-02", "machine": name}
+                                 for i, name in enumerate(machines)}, "a.{row}")
+    usual = write_page.USUAL_MACHINE
+    assert usual in read(write_page.READINGS).replace("\n", " ")
+    assert "achine" not in page_of(usual) and "Also" not in page_of(usual)
+    assert page_of("a fast one").endswith("Machine: a fast one.") and page_of(usual, "a fast one").endswith("Also: a fast one.")

@@ -20,6 +20,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
 FIGURES, READINGS = os.path.join(HERE, "figures.jsonl"), os.path.join(HERE, "readings.txt")
 PAGE = os.path.join(ROOT, "docs", "benchmarks.md")
+USUAL_MACHINE = "2 cores of an Intel Xeon beside other work"  # named at the head of the page
 
 
 def read_figures(path=FIGURES):
@@ -53,7 +54,7 @@ def order(found, wanted):
 
 
 def table(figures, pattern, row="", column="", like=".*"):
-    """A Markdown table of the figures whose names match, with the date of each row, and the machines below."""
+    """A Markdown table of the figures whose names match, with the date of each row, and the machines below where they are not the usual one."""
     match = {name: expression(pattern).fullmatch(name) for name in figures}
     match = {name: m for name, m in match.items() if m and re.fullmatch(like, m["row"])}
     if not match:
@@ -71,7 +72,8 @@ def table(figures, pattern, row="", column="", like=".*"):
         dates = [figure["date"] for figure in cells if figure]
         lines.append(f"| {name} | " + " | ".join(cell(figure) for figure in cells) + unit + f" | {max(dates)} |")
     machines = sorted({figure["machine"] for figure in shown})
-    return "\n".join(lines) + "\n\nMachine: " + "; ".join(machines) + "."
+    others = [name for name in machines if name != USUAL_MACHINE]
+    return "\n".join(lines) + (f"\n\n{'Also' if len(others) < len(machines) else 'Machine'}: {'; '.join(others)}." if others else "")
 
 
 def head(name, figures):
