@@ -264,6 +264,9 @@ def test_a_job_that_runs_too_long_fails_and_can_be_resumed(daemon_maker, behavio
     failed = d.wait_state(job, "failed")
     assert failed["error"]["code"] == "time_limit" and failed["attempt"] == 1 and failed["lost_attempts"] == 0
     d.put(f"/v1/jobs/{job}/document", json=document("succeed"))
+    d.stop()
+    del d.options["jobs.time_limit_s"]  # a busy machine may need more than a second for a job that succeeds
+    d.start()
     d.post(f"/v1/jobs/{job}/start")
     assert d.wait_state(job, "succeeded")["error"] is None
 

@@ -156,7 +156,7 @@ def test_a_real_batch(real, tables):
         assert "2, of which 2 are planned" in said, said
         batch = selvedge.Client(real.url).batch(name)
         batch.start()
-        assert batch.wait(120, 0.1).states["succeeded"] == 2
+        assert batch.wait(900, 0.1).states["succeeded"] == 2
         return batch.plan()
     first = run("first")
     shutil.rmtree(tables / "samples" / "b")
@@ -172,23 +172,29 @@ def plan_of(folder, *options):
     return json.loads(subprocess.run([program("selvedge-worker"), "--plan", *options, folder], check=True, capture_output=True, timeout=300).stdout)
 
 
-@pytest.mark.parametrize("cloth", [{"weave": "plain", "tile_warps": 4, "tile_wefts": 4, "yarns": [{"fibers": 20}]},
-                                   {"weave": "twill", "tile_warps": 12, "tile_wefts": 12, "yarns": [{"fibers": 40}]},
-                                   {"weave": "felt", "yarns": [{"fibers": 2500}]}])
-def test_a_described_cloth_is_planned_by_its_size(tables, cloth):
-    """Memory and disk within a factor of 1.6, on a service that has run nothing; processor time within 2.5, because the speeds are
-    those of one common machine and this one may be slower. Pages and renderings of a small job, some 3 MB, are planned as a constant
-    whatever the number of its rows."""
-    job = tables / "job"
-    os.makedirs(job / "input")
-    shutil.copy(tables / "samples" / "a" / "rows.csv", job / "input")
+def run_planned(folder, tables, cloth):
+    """(plan, status, bytes on disk) of a job of this cloth."""
+    os.makedirs(folder / "input")
+    shutil.copy(tables / "samples" / "a" / "rows.csv", folder / "input")
     document = json.loads((tables / "template.json").read_text())
-    (job / "job.json").write_text(json.dumps(dict(document, sample="s", cloth=cloth)))
-    p = plan_of(job, "--speeds", tables / "speeds.json")
-    assert sorted(os.listdir(job)) == ["input", "job.json"] and not (tables / "speeds.json").exists(), "a plan writes nothing"
-    subprocess.run([program("selvedge-worker"), "--quiet", job], check=True, timeout=600)
-    status = json.loads((job / "status.json").read_text())
-    disk = sum(os.stat(os.path.join(place, name)).st_blocks * 512 for place, _, names in os.walk(job) for name in names)
-    for took, planned, factor, slack in ((status["cpu_s"], p["cpu_s"], 2.5, 0), (status["peak_rss_bytes"], p["memory_bytes"], 1.6, 0),
-                                         (disk, p["disk_bytes"], 1.6, 3e6)):
-        assert 1 / factor < took / planned < factor or abs(took - planned) < slack, (took, planned, p)
+    (folder / "job.json").write_text(json.dumps(dict(document, sample="s", cloth=cloth)))
+    p = plan_of(folder, "--speeds", tables / "speeds.json")
+    assert sorted(os.listdir(folder)) == ["input", "job.json"] and not (tables / "speeds.json").exists(), "a plan writes nothing"
+    subprocess.run([program("selvedge-worker"), "--quiet", folder], check=True, timeout=1800)
+    disk = sum(os.stat(os.path.join(place, name)).st_blocks * 512 for place, _, names in os.walk(folder) for name in names)
+    return p, json.loads((folder / "status.json").read_text()), disk
+
+
+def test_a_described_cloth_is_planned_by_its_size(tables):
+    """Memory and disk within a factor of 1.6, on a service that has run nothing. Pages and renderings of a small job, some 3 MB, are
+    planned as a constant whatever the number of its rows. Processor times are planned with the speeds of one common machine, and this
+    one may be slower or busy: over their planned times the cloths differ by a factor of less than 2.5 from each other."""
+    slower = []
+    for k, cloth in enumerate([{"weave": "plain", "tile_warps": 4, "tile_wefts": 4, "yarns": [{"fibers": 20}]},
+                               {"weave": "twill", "tile_warps": 12, "tile_wefts": 12, "yarns": [{"fibers": 40}]},
+                               {"weave": "felt", "yarns": [{"fibers": 2500}]}]):
+        p, status, disk = run_planned(tables / f"job{k}", tables, cloth)
+        for took, planned, slack in ((status["peak_rss_bytes"], p["memory_bytes"], 0), (disk, p["disk_bytes"], 3e6)):
+            assert 1 / 1.6 < took / planned < 1.6 or abs(took - planned) < slack, (took, planned, p)
+        slower.append(status["cpu_s"] / p["cpu_s"])
+    assert max(slower) < 2.5 * min(slower), slower
