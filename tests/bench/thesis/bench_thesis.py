@@ -7,7 +7,7 @@
 
 STEP: beginnings of names of steps, such as "fit.silk"; the others are taken as far as they are finished. Results are kept in
 DIR/bench-thesis, one JSON file a step, so that an interrupted run goes on; steps that an older program made are named on standard error.
---page: also writes the page from them.
+--page: also writes the page from them, and its pictures beside it in images/.
 """
 import argparse
 import json
@@ -16,6 +16,7 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import thesis_fits  # noqa: E402
+import thesis_looks  # noqa: E402
 import thesis_pictures  # noqa: E402
 from thesis_fabrics import MODELS, NAMES  # noqa: E402
 from thesis_jobs import Steps  # noqa: E402
@@ -55,8 +56,25 @@ def pictures(steps):
             found["shapes", fabric, model] = thesis_pictures.shapes(steps, fabric, model)
     found.update({("fast", name): value for name, value in thesis_pictures.ablations(steps).items()})
     found.update({("chain", name): thesis_pictures.chain(steps, name) for name in thesis_pictures.CHAIN})
-    found.update({("stripes", name): thesis_pictures.stripes(steps, name) for name in ("fitted", "alternative")})
+    found.update({("stripes", name): thesis_pictures.stripes(steps, name) for name in ("fitted", "alternative", "microflake")})
+    found.update({("seconds", name): (steps.kept(f"fast.{name}") or {}).get("cpu_s") for name in ("path", "dual")})
     return found
+
+
+def looks(steps):
+    found = {("thin", d): thesis_looks.thin(steps, d) for d in thesis_fits.DENSITIES}
+    found.update({("tables", fabric): thesis_looks.tables(steps, fabric) for fabric in thesis_looks.TABLE_FABRICS})
+    found.update({("mesh", fabric, sheet): thesis_looks.mesh(steps, fabric, sheet) for fabric in thesis_looks.MESH_FABRICS for sheet in (True, False)})
+    rows = steps.kept("truth.silk.two_lobe.f")
+    found["silk rows"] = rows and rows["value"]
+    return found
+
+
+def draw(found, folder):
+    """The two pictures of the page; a picture whose steps are not there stays as it is."""
+    if any(found["shapes", fabric, model] for fabric in NAMES for model in ("photograph", "volume", "microflake")):
+        thesis_looks.draw_columns(found, os.path.join(folder, "thesis-columns.svg"))
+    thesis_looks.draw_drapes(found, os.path.join(folder, "thesis-drapes.webp"))
 
 
 def main():
@@ -67,10 +85,11 @@ def main():
     a = p.parse_args()
     build = os.path.abspath(a.build)
     steps = Steps(build, os.path.join(build, "bench-thesis"), a.steps)
-    found = {**fits(steps), **pictures(steps)}
+    found = {**fits(steps), **pictures(steps), **looks(steps)}
     standing = steps.standing()
     if a.page:
         write_page(found, standing, a.page)
+        draw(found, os.path.join(os.path.dirname(os.path.abspath(a.page)), "images"))
 
 
 main()

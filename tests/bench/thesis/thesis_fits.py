@@ -116,16 +116,20 @@ def take_fit(rows, parameters):
         pulls = [(p["name"], p["value"], p["standard_error"], p["determined"]) for p in result["parameters"] if not p["fixed"]]
         return {"heldout": error, "below_noise": square < 2 * square_se, "brdf": plain, "ratio": error / plain,
                 "grazing": ratio, "converged": result["converged"], "paths": result["n_path_fit"],
-                "parameters": pulls, "truth": flat(parameters) if parameters else None, "of_rows": scatter(result)}
+                "parameters": pulls, "truth": flat(parameters) if parameters else None, "of_rows": [scatter(result, "held-out")]}
     return take
 
 
-def scatter(result):
-    """Correlation and slope of rendered against measured mean radiances of the further rows (figures 5.20, 5.21)."""
-    xy = [(m, r) for row in result["rows"] if row["set"] == "held-out" for m, r in zip(row["measured"], row["rendered"])]
-    mx, my = (sum(v) / len(xy) for v in zip(*xy))
-    sxx, syy, sxy = sum((x - mx) ** 2 for x, _ in xy), sum((y - my) ** 2 for _, y in xy), sum((x - mx) * (y - my) for x, y in xy)
-    return [sxy / math.sqrt(sxx * syy), sxy / sxx]
+def correlation(xs, ys):
+    mx, my = sum(xs) / len(xs), sum(ys) / len(ys)
+    sxy = sum((x - mx) * (y - my) for x, y in zip(xs, ys))
+    return sxy / math.sqrt(sum((x - mx) ** 2 for x in xs) * sum((y - my) ** 2 for y in ys))
+
+
+def scatter(result, kind):
+    """Correlation of rendered and measured mean radiances of the rows of a set (figures 5.20, 5.21)."""
+    rows = [row for row in result["rows"] if row["set"] == kind]
+    return correlation([v for row in rows for v in row["measured"]], [v for row in rows for v in row["rendered"]])
 
 
 def flat(parameters):
@@ -145,7 +149,8 @@ def fit(steps, fabric, model, of):
                 "fit": {"model": MODELS[model], "seed": OTHER, "path_budget": BUDGET, **SMALL}}
     table = table_of(rows, without_grazing=model == "microflake" and of != "microflake")
     found = steps.job(name, document, {"rows.csv": table}, take_fit(rows, truth(fabric, model) if model == of else None))
-    return found and {**found, "cpu_s": steps.kept(name)["cpu_s"]}
+    whole = steps.result(name)
+    return found and {**found, "cpu_s": steps.kept(name)["cpu_s"], "of_fitted": whole and scatter(whole, "fit")}
 
 
 DENSITIES = (4000, 2000, 1000)  # figure 5.8
@@ -164,4 +169,6 @@ def bisected(steps, fabric):
     rows = make_truth(steps, fabric, "two_lobe")
     document = {"sample": f"{fabric}, microflakes by mean and variance", "cloth": cloth(fabric), "measurements": {"file": "rows.csv"},
                 "fit": {"model": MODELS["microflake"], "method": "mean_variance.v1", "seed": OTHER, "path_budget": 4000000, **SMALL}}
-    return rows and steps.job(f"bisected.{fabric}", document, {"rows.csv": table_of(rows, without_grazing=True)}, take_fit(rows, None))
+    name = f"bisected.{fabric}"
+    found = rows and steps.job(name, document, {"rows.csv": table_of(rows, without_grazing=True)}, take_fit(rows, None))
+    return found and {**found, "cpu_s": steps.kept(name)["cpu_s"]}

@@ -37,6 +37,14 @@ class Steps:
         with open(path, encoding="utf-8") as f:
             return json.load(f)
 
+    def result(self, name):
+        """The whole result of the job of a step, or None where its folder is not there."""
+        path = os.path.join(self.folder, name, "results", "result.json")
+        if not os.path.exists(path):
+            return None
+        with open(path, encoding="utf-8") as f:
+            return json.load(f)
+
     def keep(self, name, value):
         path = os.path.join(self.folder, name + ".json")
         with open(path + ".new", "w", encoding="utf-8") as f:

@@ -6,11 +6,12 @@ import os
 import re
 
 from thesis_fabrics import MODELS, NAMES
+from thesis_fits import correlation
+from thesis_numbers import MISSING, is_off, listed, own_numbers
 from thesis_pictures import ANGLES, CELL_PATHS, CHAIN, ORDERS, SIDE
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 
-MISSING = "-"
 SHOWN = ("fleece", "gabardine", "silk")
 
 
@@ -21,10 +22,6 @@ def digits(value):
 def span(values, form="{:.2f}"):
     values = list(values)
     return MISSING if not values else f"{form.format(min(values))} to {form.format(max(values))}" if len(values) > 1 else form.format(values[0])
-
-
-def listed(values, form="{:.2f}"):
-    return ", ".join(MISSING if v is None else form.format(v) for v in values)
 
 
 def with_ratio(fit):
@@ -68,12 +65,6 @@ def grazing(found):
     return "\n".join(lines)
 
 
-def correlation(xs, ys):
-    mx, my = sum(xs) / len(xs), sum(ys) / len(ys)
-    sxy = sum((x - mx) * (y - my) for x, y in zip(xs, ys))
-    return sxy / math.sqrt(sum((x - mx) ** 2 for x in xs) * sum((y - my) ** 2 for y in ys))
-
-
 def column_correlations(found, model):
     for fabric in NAMES:
         shown, true = found["shapes", fabric, model], found["shapes", fabric, "photograph"]
@@ -83,22 +74,9 @@ def column_correlations(found, model):
 
 
 def recovered(found):
-    """(determined parameters within two standard errors of the truth, determined parameters, names and models of the others)."""
-    inside, counted, others = 0, 0, {}
-    for model in MODELS:
-        for fit in (found[fabric, model] for fabric in NAMES if found[fabric, model]):
-            for name, value, se, determined in fit["parameters"]:
-                counted += determined
-                inside += determined and abs(value - fit["truth"][name]) <= 2 * se
-                if determined and abs(value - fit["truth"][name]) > 2 * se:
-                    others.setdefault(f"{name.split('.')[0]} of {model}", 0)
-                    others[f"{name.split('.')[0]} of {model}"] += 1
-    return inside, counted, ", ".join(f"{n} {what}" for what, n in others.items())
-
-
-def gammas(found):
-    values = {fabric: dict((p[0], p[1]) for p in found[fabric, "microflake"]["parameters"])["gamma"] for fabric in NAMES if found[fabric, "microflake"]}
-    return f"{span([v for f, v in values.items() if f != 'velvet'], '{:.4f}')} and {values.get('velvet', math.nan):.4f}"
+    """(determined parameters within two standard errors of the truth, determined parameters)."""
+    rows = [(found[fabric, model], row) for model in MODELS for fabric in NAMES if found[fabric, model] for row in found[fabric, model]["parameters"] if row[3]]
+    return sum(not is_off(fit, *row) for fit, row in rows), len(rows)
 
 
 def meshes(found):
@@ -147,11 +125,12 @@ def kept_figures():
 
     def of(what, form):
         return ", ".join(form.format(rows[f"pictures.{fabric}.{what}"]) if f"pictures.{fabric}.{what}" in rows else MISSING for fabric in SHOWN)
-    return {"flat": of("flat492_rel_rms", "{:.3f}"), "speeds": of("speedup_at_equal_noise", "{:.1f}")}
+    mb = ", ".join(f"{rows[name] / 1e6:.1f}" if name in rows else MISSING for name in (f"pictures.{fabric}.precompute_bytes" for fabric in SHOWN))
+    return {"flat": of("flat492_rel_rms", "{:.3f}"), "speeds": of("speedup_at_equal_noise", "{:.1f}"), "table_mb": mb}
 
 
-def stripe(found, what):
-    new, old = found["stripes", "alternative"], found["stripes", "fitted"]
+def stripe(found, what, name="alternative"):
+    new, old = found["stripes", name], found["stripes", "fitted"]
     return f"{new[what] / old[what]:.2f}" if new and old else MISSING
 
 
@@ -165,26 +144,26 @@ def machine(days, n_other):
 
 
 def values(found, standing):
-    inside, counted, others = recovered(found)
+    inside, counted = recovered(found)
     own = [found[fabric, model] for fabric in NAMES for model in MODELS if found[fabric, model]]
     timed = [f["cpu_s"] for f in own if f["cpu_s"] is not None]
-    cross = {m: [found[f, m, "cross"] for f in NAMES if found[f, m, "cross"]] for m in ("volume", "microflake")}
-    text = {"fits": fits(found), "grazing": grazing(found), "within": inside, "counted": counted, "others": others,
-            "gamma": gammas(found), "mesh": meshes(found),
+    microflakes = [found[f, "microflake", "cross"] for f in NAMES if found[f, "microflake", "cross"]]
+    by_moments = [found[fabric, "bisected"] for fabric in NAMES if found[fabric, "bisected"]]
+    bisected = [f["cpu_s"] for f in by_moments if f["cpu_s"] is not None]
+    text = {"fits": fits(found), "grazing": grazing(found), "within": inside, "counted": counted, "mesh": meshes(found),
             "fit_cpu": f"{sum(timed) / len(timed):.0f}" if timed else MISSING,
+            "bisected_cpu": f"{sum(bisected) / len(bisected):.0f}" if bisected else MISSING,
             "density": listed([d and d["heldout"] for d in (found["density", d] for d in (4000, 2000, 1000))], "{:.3f}"),
             "contrast": stripe(found, "contrast"), "stripes_mean": stripe(found, "mean"), "machine": machine(*standing),
-            "scatter_two_lobe": span([found[f, "two_lobe"]["of_rows"][0] for f in NAMES if found[f, "two_lobe"]], "{:.3f}"),
-            "grazing_range": span([v for fit in cross["microflake"] for v in fit["grazing"]])}
-    for model, of in cross.items():
-        text[f"scatter_{model}"] = span([fit["of_rows"][0] for fit in of], "{:.3f}")
+            "contrast_microflake": stripe(found, "contrast", "microflake"),
+            "grazing_range": span([v for fit in microflakes for v in fit["grazing"]])}
+    for model in ("volume", "microflake"):
         text[f"columns_{model}"] = span(column_correlations(found, model))
-    by_moments = [found[fabric, "bisected"] for fabric in NAMES if found[fabric, "bisected"]]
     text["bisected"] = span([fit["heldout"] for fit in by_moments])
     text["bisected_gamma"] = span([p[1] for fit in by_moments for p in fit["parameters"] if p[0] == "gamma"], "{:.3f}")
     text["missing"] = f" {MISSING}: not run." if any(v is None for v in found.values()) else ""
     text.update({name: highlight(found, name) for name in CHAIN})
-    return {**text, **fast(found), **kept_figures()}
+    return {**text, **fast(found), **kept_figures(), **own_numbers(found)}
 
 
 def write_page(found, standing, path):

@@ -83,10 +83,12 @@ def take_contrast(result, folder):
 
 
 def stripes(steps, name):
-    fixed = {**truth("twill", "two_lobe"), **(ALTERNATIVE if name == "alternative" else {})}
+    """name: fitted, alternative, or microflake, which were fitted to the fibers."""
+    model = name if name == "microflake" else "two_lobe"
+    fixed = fitted(steps, "twill", name) if name == "microflake" else {**truth("twill", "two_lobe"), **(ALTERNATIVE if name == "alternative" else {})}
     view = {"on": "flat", "size_mm": 40, "width_mm": 3, "light_theta_deg": 30, "light_phi_deg": 30,
             "camera_theta_deg": 0, "camera_phi_deg": 0, "px": 96, "samples": 32}
-    return steps.job(f"stripes.{name}", document("twill", "two_lobe", fixed, [view, view]), {}, take_contrast)
+    return fixed and steps.job(f"stripes.{name}", document("twill", model, fixed, [view, view]), {}, take_contrast)
 
 
 # Figures 6.7 and 6.8: one repeat of gabardine, because tables of cells take long
