@@ -64,7 +64,7 @@ def table(figures, pattern, row="", column="", like=".*"):
     columns = order(dict.fromkeys(m["column"] for m in match.values()), column.split(",") if column else None) if has_column else ["value"]
     at = {(m["row"], m["column"] if has_column else "value"): figures[name] for name, m in match.items()}
     shown = [figure for key, figure in at.items() if key[0] in rows and key[1] in columns]
-    lines = ["| | " + " | ".join(head(name, [at.get((r, name)) for r in rows]) for name in columns) + " | date |",
+    lines = ["| | " + " | ".join(head(name, [at.get((r, name)) for r in rows]) for name in columns) + " | |",
              "|" + "---|" * (len(columns) + 2)]
     for name in rows:
         cells = [at.get((name, other)) for other in columns]

@@ -190,7 +190,12 @@ static status make_tiles(const struct directions_input *in, struct directions_ou
 static status join_seams(const struct directions_input *in, struct directions_output *out, struct error *err)
 {
     struct reconstruct_report *g = &out->geometry;
-    if (out->fiber.n_fiber == 0) return STATUS_OK;
+    if (out->fiber.n_fiber == 0) {
+        if (in->scan->tiles > 1)
+            worker_status_warn(in->tools->status, "'%s' has no effect: there are no fibers to make a large tile of",
+                               job_option_key(OPTION_TILES));
+        return STATUS_OK;
+    }
     status s = fiber_set_copy(&out->fiber, &out->traced, err);
     if (s == STATUS_OK) s = fiber_seam_measure(&out->fiber, &g->seam_found, err);
     if (s == STATUS_OK && in->scan->join_seams) s = fiber_seam_join(&out->fiber, &g->seam_join, err);
