@@ -103,7 +103,7 @@ class Batch:
     def folder(self, sample):
         return os.path.join(self.daemon.data, "jobs", self.job[sample])
 
-    def wait(self, patience_s=300):
+    def wait(self, patience_s=1500):
         """Waits for the end of all jobs; returns them, {sample: job}."""
         end = time.monotonic() + patience_s
         while time.monotonic() < end:

@@ -34,7 +34,7 @@ def folders():
 @pytest.mark.slow
 def test_the_demo():
     before = folders()
-    done = subprocess.run([sys.executable, DEMO], capture_output=True, text=True, check=False, timeout=1500)
+    done = subprocess.run([sys.executable, DEMO], capture_output=True, text=True, check=False, timeout=5400)
     if done.returncode == SKIPPED:
         pytest.skip(done.stdout.strip())
     assert done.returncode == 0, done.stdout + done.stderr
