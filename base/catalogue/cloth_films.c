@@ -55,6 +55,13 @@ status cloth_films_check(const struct cloth_description *d, struct error *err)
             s = error_set_field(err, STATUS_INVALID, field,
                                 "'%s' is 0: kinds of yarn that are a film alone come last in 'yarns'", field);
     }
+    for (size_t k = 0; k < d->n_kind && s == STATUS_OK; k++) {
+        const int with = d->kind[k].melange_with;
+        snprintf(field, sizeof field, "yarns[%zu].melange_with", k);
+        if (with >= 0 && (d->kind[k].n_fiber == 0 || d->kind[with].n_fiber == 0))
+            s = error_set_field(err, STATUS_INVALID, field, "'%s' is %d: a film alone has no fibers to mix", field,
+                                with);
+    }
     struct film_groups groups;
     cloth_film_groups(d, &groups);
     if (s == STATUS_OK && groups.first_group + groups.n > CLOTH_MAX_GROUP)

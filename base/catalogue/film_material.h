@@ -29,6 +29,11 @@ struct film_material {
     uint32_t optics;  /* enum film_optics */
 };
 
+/* Bounds of the slope of facets that are seen one by one, and of the grains of a height field of waves. */
+#define FILM_MOST_SLOPE 0.5
+#define FILM_LEAST_WAVE_GRAIN_UM 4.0
+#define FILM_MOST_WAVE_GRAIN_UM 128.0
+
 /* Whether light is reflected as waves. */
 static inline bool film_has_waves(const struct film_material *m)
 {

@@ -64,16 +64,17 @@ status glint_cells_make(const struct glint_lattice *l, struct glint_cells *c, st
     const size_t n_list = c->n_tile * c->n_tile * GLINT_N_CELL * GLINT_N_CELL;
     bounds(l, c);
     c->start = calloc(n_list + 1, sizeof *c->start);
-    uint32_t *next = malloc(n_list * sizeof *next), sum = 0;
+    uint32_t *next = malloc(n_list * sizeof *next);
+    uint64_t sum = 0;
     if (c->start != NULL && next != NULL) {
         visit(l, c, c->start, NULL);
         for (size_t k = 0; k < n_list; k++) {
             const uint32_t n = c->start[k];
-            c->start[k] = next[k] = sum;
+            c->start[k] = next[k] = (uint32_t)sum;
             sum += n;
         }
-        c->start[n_list] = sum;
-        c->index = malloc((sum > 0 ? sum : 1) * sizeof *c->index);
+        c->start[n_list] = (uint32_t)sum;
+        if (sum <= UINT32_MAX) c->index = malloc((sum > 0 ? sum : 1) * sizeof *c->index);
         if (c->index != NULL) visit(l, c, next, c->index);
     }
     free(next);

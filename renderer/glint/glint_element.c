@@ -1,5 +1,7 @@
 #include "renderer/glint/glint_element.h"
 
+#include "renderer/glint/wave_lanes.h"
+
 #include <math.h>
 #include <stdlib.h>
 
@@ -68,16 +70,6 @@ void glint_query_init(const struct glint_lattice *l, const struct glint_footprin
     q->factor = l->step_um * l->step_um / (4 * (float)(M_PI * M_PI) * sqrtf(det) * total_weight(l, q));
 }
 
-/* exp(x) for x in -87 to 0, and 0 below; relative error 2e-7. */
-static inline lanes exp_lanes(lanes x)
-{
-    const lanes scaled = x * (float)M_LOG2E, magic = scaled * 0 + 12582912.0F;
-    const lanes whole = (scaled + magic) - magic, f = (scaled - whole) * (float)M_LN2;
-    const lanes p = 1 + f * (1 + f * (0.5F + f * (1 / 6.0F + f * (1 / 24.0F + f * (1 / 120.0F + f * (1 / 720.0F))))));
-    const lane_mask bits = (lane_mask)((__builtin_convertvector(whole, lane_mask) + 127) << 23);
-    return lanes_choose(x > -87, p * (lanes)bits, x * 0);
-}
-
 /* The density of eight elements, without the factor of the query. */
 static inline lanes eight(const struct glint_query *q, const lanes place[4], const lanes j[4], const float center[2],
                           const float half[2])
@@ -91,7 +83,7 @@ static inline lanes eight(const struct glint_query *q, const lanes place[4], con
     const lanes ss = q->variance_r + as * j[0] + bs * j[1], st = as * j[2] + bs * j[3];
     const lanes tt = q->variance_r + at * j[2] + bt * j[3], per_det = 1 / (ss * tt - st * st);
     const lanes near = (rs * rs * tt - 2 * rs * rt * st + rt * rt * ss) * per_det;
-    return exp_lanes(-0.5F * (far + near)) * lanes_sqrt(per_det);
+    return lanes_exp_negative(-0.5F * (far + near)) * lanes_sqrt(per_det);
 }
 
 float glint_query_sum(const struct glint_query *q, const struct glint_element *element, const uint32_t *index, size_t n,

@@ -56,7 +56,7 @@ static status make(const struct film_material *m, uint64_t seed, struct glint_su
     struct glint_option o = {.kind = kind[m->surface],
                              .seed = seed,
                              .texel_um = m->grain_um / TEXELS_PER_GRAIN,
-                             .slope = fminf(m->roughness, 0.5f),
+                             .slope = fminf(m->roughness, (float)FILM_MOST_SLOPE),
                              .roughness = UNRESOLVED,
                              .length_um = {m->grain_um, m->grain_um},
                              .flake_um = m->grain_um};
@@ -64,14 +64,15 @@ static status make(const struct film_material *m, uint64_t seed, struct glint_su
     return glint_surface_new(&o, out, err);
 }
 
-/* The heights of a film with waves. Grains are at least 4 um and at most an eighth of the tile; slopes of noise have
+/* The heights of a film with waves. Grains are at most an eighth of the tile; slopes of noise have
  * the root mean square that glint_surface has, in two dimensions. A scratched film has 0.3 of its tile covered by
  * grooves as steep as that, on noise of half of it. */
 static status make_waves(const struct film_material *m, uint64_t seed, struct wave_glint **out, struct error *err)
 {
     struct wave_glint_option o = wave_glint_option_usual();
     const double side_um = (double)o.height.n * o.height.texel_um,
-                 grain = fmin(fmax((double)m->grain_um, 4), side_um / 8), slope = fmin((double)m->roughness, 0.5);
+                 grain = fmin(fmax((double)m->grain_um, FILM_LEAST_WAVE_GRAIN_UM), FILM_MOST_WAVE_GRAIN_UM),
+                 slope = fmin((double)m->roughness, FILM_MOST_SLOPE);
     o.model = (enum wave_model)(m->optics - FILM_OHS);
     o.height.seed = seed;
     o.height.length_um[0] = m->surface == FILM_BRUSHED ? fmin((double)BRUSHED_RATIO * grain, side_um) : grain;

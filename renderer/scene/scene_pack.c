@@ -67,13 +67,25 @@ static bool vertex_in_range(const struct scene *s, size_t i)
     return good;
 }
 
+static bool films_in_range(const struct film_groups *f)
+{
+    bool good = f->n <= FILM_MAX_GROUP && f->first_group <= FIBER_MAX_GROUP;
+    for (size_t k = 0; good && k < f->n; k++) {
+        const struct film_material *m = &f->material[k];
+        good = m->surface <= FILM_FLAKES && m->optics <= FILM_KIRCHHOFF && m->roughness > 0 && m->roughness <= 1 &&
+               (m->surface == FILM_SMOOTH || (m->grain_um > 0 && isfinite(m->grain_um)));
+        for (int c = 0; c < 3; c++) good = good && m->color[c] >= 0 && m->color[c] <= 1;
+    }
+    return good;
+}
+
 /* With sizes that scene_new does not permit, the cells of the grid could be filled for hours. */
 static bool in_range(const struct scene *s)
 {
     double largest_mm = 0;
     bool good = s->n_segment > 0 && s->n_group >= 1 && s->n_group <= FIBER_MAX_GROUP &&
-                (s->ratio == NULL || s->long_axis != NULL) && s->films.n <= FILM_MAX_GROUP &&
-                s->films.first_group <= FIBER_MAX_GROUP && (s->films.n == 0 || s->ratio != NULL) &&
+                (s->ratio == NULL || s->long_axis != NULL) && films_in_range(&s->films) &&
+                ((s->films.n == 0 && !s->shows_sections) || s->ratio != NULL) &&
                 (!s->has_sections || s->long_axis != NULL) && isfinite(s->bottom_mm);
     for (size_t i = 0; i < s->n_vertex; i++) largest_mm = fmax(largest_mm, (double)s->vertex[i].radius);
     for (int a = 0; a < 2; a++)

@@ -8,6 +8,8 @@
 #include "renderer/fast/precompute/fast_precompute.h"
 #include "renderer/image/image.h"
 #include "renderer/scattering/film_glint.h"
+#include "renderer/scene/scene_glint.h"
+#include "renderer/scene/scene_pack.h"
 #include "renderer/scene/scene_ray.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/estimate_fixture.h"
@@ -244,6 +246,32 @@ static void test_no_films_same_bits(void **state)
     fiber_set_release(&f);
 }
 
+/* Another rank's scene has the same films; materials that cannot be are refused. */
+static void test_packed(void **state)
+{
+    (void)state;
+    struct film_groups films = sheet_film;
+    films.material[0].surface = FILM_FLAKES;
+    films.material[0].grain_um = 8;
+    for (int k = 0; k < 4; k++) {
+        struct film_groups sent = films;
+        struct byte_pack pack = {0};
+        struct scene *copy = NULL;
+        if (k == 1) sent.material[0].surface = FILM_FLAKES + 1;
+        if (k == 2) sent.material[0].grain_um = NAN;
+        if (k == 3) sent.material[0].color[1] = 2;
+        struct scene *scene = sheet(&sent);
+        scene_pack(scene, &pack);
+        struct byte_view view = {.data = pack.data, .n = pack.n};
+        assert_int_equal(scene_unpack(&view, &copy, NULL), k == 0 ? STATUS_OK : STATUS_FORMAT);
+        if (k == 0) assert_memory_equal(scene_films(copy), &films, sizeof films);
+        if (k == 0) assert_int_equal(scene_glints_make(copy, NULL), STATUS_OK);
+        byte_pack_release(&pack);
+        scene_free(copy);
+        scene_free(scene);
+    }
+}
+
 static void test_tables(void **state)
 {
     (void)state;
@@ -290,8 +318,8 @@ static void test_tables(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest test[] = {cmocka_unit_test(test_sheet), cmocka_unit_test(test_sheet_of_flakes),
+    const struct CMUnitTest test[] = {cmocka_unit_test(test_sheet),       cmocka_unit_test(test_sheet_of_flakes),
                                       cmocka_unit_test(test_derivatives), cmocka_unit_test(test_no_films_same_bits),
-                                      cmocka_unit_test(test_tables)};
+                                      cmocka_unit_test(test_tables),      cmocka_unit_test(test_packed)};
     return cmocka_run_group_tests(test, NULL, NULL);
 }

@@ -2,6 +2,7 @@
 #include "base/catalogue/cloth_description.h"
 #include "base/catalogue/correction_numbers.h"
 #include "optimizer/job/checks/job_document_parts.h"
+#include "optimizer/job/checks/job_film.h"
 #include "optimizer/job/checks/option_checks.h"
 #include "optimizer/job/document/job_cloth.h"
 
@@ -157,40 +158,16 @@ static struct json_field field_of(const json_t *section, int kind)
     return f;
 }
 
-/* Refuses keys of films or sequins without the one that says that there are any, and waves on surfaces without them. */
-static status check_film_keys(const struct json_field *f, const char *prefix, const char *size_key, struct error *err)
-{
-    char path[JSON_PATH_BYTES], key[32];
-    const char *name;
-    json_t *value;
-    json_object_foreach((json_t *)f->object, name, value)
-    {
-        if (strncmp(name, prefix, strlen(prefix)) != 0 || json_object_get(f->object, size_key) != NULL) continue;
-        json_field_path(f, name, path);
-        return error_set_field(err, STATUS_INVALID, path, "'%s' changes nothing without '%s'", path, size_key);
-    }
-    snprintf(key, sizeof key, "%soptics", prefix);
-    const char *optics = json_string_value(json_object_get(f->object, key));
-    json_field_path(f, key, path);
-    snprintf(key, sizeof key, "%ssurface", prefix);
-    const char *surface = json_string_value(json_object_get(f->object, key));
-    if (optics == NULL || strcmp(optics, film_optics_names[FILM_RAYS]) == 0) return STATUS_OK;
-    if (surface == NULL) surface = film_surface_names[FILM_SMOOTH];
-    if (strcmp(surface, film_surface_names[FILM_SMOOTH]) != 0 && strcmp(surface, film_surface_names[FILM_FLAKES]) != 0)
-        return STATUS_OK;
-    return error_set_field(err, STATUS_INVALID, path, "'%s' is '%s': the surface '%s' is not rendered by waves", path,
-                           optics, surface);
-}
-
-static status read_numbers(const json_t *section, struct cloth_description *d, struct error *err)
+static status read_numbers(const json_t *section, const struct job_cloth *cloth, struct cloth_description *d,
+                           struct error *err)
 {
     status st = STATUS_OK;
     for (int k = -1; k < (int)d->n_kind && st == STATUS_OK; k++) {
         struct json_field f = field_of(section, k);
         if (f.object != NULL) st = check_surplus(&f, k, d, err);
         if (f.object != NULL && st == STATUS_OK)
-            st = k < 0 ? check_film_keys(&f, "sequin_", "sequin_diameter_um", err)
-                       : check_film_keys(&f, "film_", "film_width_um", err);
+            st = k < 0 ? job_film_check_keys(&f, "sequin_", "sequin_diameter_um", &cloth->sequins, err)
+                       : job_film_check_keys(&f, "film_", "film_width_um", &cloth->yarn[k].film, err);
     }
     for (size_t i = 0; i < d->n_number && st == STATUS_OK; i++) {
         struct json_field f = field_of(section, d->number[i].kind);
@@ -199,24 +176,12 @@ static status read_numbers(const json_t *section, struct cloth_description *d, s
     return st;
 }
 
-static void take_material(const struct job_film *from, struct film_material *m)
-{
-    film_metal_color(from->metal, m->color);
-    for (int c = 0; c < 3 && !isnan(from->color[0]); c++) m->color[c] = (float)from->color[c];
-    m->roughness = (float)from->roughness;
-    m->grain_um = (float)from->grain_um;
-    for (uint32_t k = 0; film_surface_names[k] != NULL; k++)
-        if (strcmp(film_surface_names[k], from->surface) == 0) m->surface = k;
-    for (uint32_t k = 0; film_optics_names[k] != NULL; k++)
-        if (strcmp(film_optics_names[k], from->optics) == 0) m->optics = k;
-}
-
 static void take_film(const struct job_film *from, struct cloth_kind *kind)
 {
     if (isnan(from->width_um)) return;
     kind->film = (struct cloth_film){
         .width_um = from->width_um, .thickness_um = from->thickness_um, .wraps_per_m = from->wraps_per_m};
-    take_material(from, &kind->film.material);
+    job_film_take_material(from, &kind->film.material);
 }
 
 static void take_sequins(const struct job_film *from, struct cloth_sequins *q)
@@ -228,7 +193,7 @@ static void take_sequins(const struct job_film *from, struct cloth_sequins *q)
                                 .row_spacing_um = from->row_spacing_um,
                                 .tilt_deg = from->tilt_deg,
                                 .tilt_spread_deg = from->tilt_spread_deg};
-    take_material(from, &q->material);
+    job_film_take_material(from, &q->material);
 }
 
 static void take_kinds(const struct job_cloth *cloth, const json_t *section, struct cloth_description *d)
@@ -284,7 +249,7 @@ static status read_cloth(const json_t *section, struct job_cloth *cloth, struct 
         st = read_order(section, a, d, err);
     }
     cloth_description_number(d);
-    if (st == STATUS_OK) st = read_numbers(section, d, err);
+    if (st == STATUS_OK) st = read_numbers(section, cloth, d, err);
     return st == STATUS_OK ? cloth_description_check(d, err) : st;
 }
 

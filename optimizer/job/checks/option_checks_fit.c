@@ -2,6 +2,7 @@
 #include "base/catalogue/method_catalogue.h"
 #include "base/catalogue/model_catalogue.h"
 #include "base/catalogue/picture_method.h"
+#include "optimizer/job/checks/job_film.h"
 #include "optimizer/job/checks/option_checks.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_fit_option.h"
@@ -358,6 +359,8 @@ status job_check_pictures(const struct option_value *v, struct error *err)
         if (s == STATUS_OK)
             s = check_preview(v->section->setup, &v->section->results->surface_picture[i], json_array_get(v->value, i),
                               i, err);
+        if (s == STATUS_OK)
+            s = job_film_check_picture(v->section->cloth, &v->section->results->surface_picture[i], i, err);
         if (s == STATUS_OK) s = check_cells(v->section->results, json_array_get(v->value, i), i, err);
     }
     return s;

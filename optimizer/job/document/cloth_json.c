@@ -43,6 +43,7 @@ static void put_material(json_t *to, const char *prefix, const struct film_mater
     json_object_set_new(to, key, json_string(film_surface_names[m->surface]));
     snprintf(key, sizeof key, "%soptics", prefix);
     json_object_set_new(to, key, json_string(film_optics_names[m->optics]));
+    if (m->surface == FILM_SMOOTH) return;
     snprintf(key, sizeof key, "%sgrain_um", prefix);
     json_object_set_new(to, key, json_real(round(1e4 * (double)m->grain_um) / 1e4));
 }

@@ -47,7 +47,8 @@ status export_text_close(const struct export_scene *e, struct export_text *t, co
 
 bool export_fiber_in(const struct export_scene *e, size_t i, size_t group)
 {
-    return e->report->in.made->fiber.group[i] == group || e->model->setup->sets.n_set == 1;
+    const uint8_t own = e->report->in.made->fiber.group[i];
+    return film_of_group(&e->films, own) == NULL && (own == group || e->model->setup->sets.n_set == 1);
 }
 
 size_t export_n_point(const struct export_scene *e, size_t i)

@@ -6,6 +6,7 @@
 #ifndef SELVEDGE_OPTIMIZER_EXPORT_SCENE_H
 #define SELVEDGE_OPTIMIZER_EXPORT_SCENE_H
 
+#include "base/catalogue/film_material.h"
 #include "optimizer/report/export/hair_fit.h"
 #include "optimizer/report/findings/report.h"
 
@@ -30,6 +31,7 @@ struct export_scene {
     struct hair_fit hair[SCATTERING_MAX_SET];
     struct hair_error hair_error;
     struct hair_error own_error; /* of a format that judges its material itself, set by its write */
+    struct film_groups films;    /* of the cloth, which are left out of exported fibers */
     double z_low_m, z_high_m;
     const char *folder; /* of the format that is being written, under results/ */
     const struct progress *progress;
@@ -60,7 +62,7 @@ status export_text_open(struct export_text *t, struct error *err);
 status export_text_close(const struct export_scene *e, struct export_text *t, const char *name, struct error *err);
 void export_path(const struct export_scene *e, const char *name, char path[WORKER_PATH_BYTES]);
 
-/* Returns whether fiber i belongs to group. */
+/* Returns whether fiber i belongs to group. Films belong to none: other programs have no such curves. */
 bool export_fiber_in(const struct export_scene *e, size_t i, size_t group);
 /* Control points of the cubic B-spline of fiber i: the vertices, and before the first and after the last one its
  * neighbour mirrored there, so that the curve begins and ends at them. Between, it passes a vertex by a sixth of the

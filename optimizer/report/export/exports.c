@@ -2,6 +2,7 @@
 
 #include "base/files/durable.h"
 #include "base/option_id.h"
+#include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/job_setup.h"
@@ -88,6 +89,18 @@ static const char no_sections[] = "exact.xml of the export for Mitsuba takes the
                                   "flat in the cloth, because curves "
                                   "of Mitsuba are round; in this job's renderings they turn as they were measured";
 
+static const char no_films[] = "the exported fibers are without the films and sequins of the cloth, which hair "
+                               "materials cannot show; the stated errors do not contain that";
+static const char mean_films[] = "exported textures contain the films and sequins of the cloth in their means over the "
+                                 "tile, without glitter";
+
+/* Sentence about the films of the cloth for format i; NULL: it has none. */
+static const char *about_films(const struct export_scene *e, size_t i)
+{
+    if (e->films.n == 0) return NULL;
+    return exports[i].format->has_hair ? no_films : mean_films;
+}
+
 /* Adds what people need to know of a format with this error to its entry. */
 static void state_warnings(const struct export_scene *e, size_t i, const struct hair_error *h, json_t *json)
 {
@@ -98,6 +111,7 @@ static void state_warnings(const struct export_scene *e, size_t i, const struct 
         json_array_append_new(list, json_sprintf("the cloth with these materials differs from this job's renderings by "
                                                  "%.0f %% over its rows",
                                                  percent * hypot(h->row_rel_rms, deviation)));
+    if (about_films(e, i) != NULL) json_array_append_new(list, json_string(about_films(e, i)));
     if (misses_sections(e, i)) json_array_append_new(list, json_string(no_sections));
     if (h->stated && deviation > 0.0)
         json_array_append_new(list, json_sprintf("the program's own renderings of these materials are some %.0f %% "
@@ -150,6 +164,10 @@ static void warn_of_rest(const struct export_scene *e)
     for (size_t i = 0; i < N_FORMAT; i++)
         if (e->report->in.results->exported[i] && misses_sections(e, i))
             worker_status_warn(e->report->in.job->tools->status, "%s", no_sections);
+    for (size_t i = 0, known[2] = {0}; i < N_FORMAT; i++)
+        if (e->report->in.results->exported[i] && about_films(e, i) != NULL &&
+            known[exports[i].format->has_hair]++ == 0)
+            worker_status_warn(e->report->in.job->tools->status, "%s", about_films(e, i));
     if (!export_repeats(e, n))
         worker_status_warn(e->report->in.job->tools->status,
                            "the exported scenes have %d x %d repeats of the tile, the most that are written: the "
@@ -228,6 +246,7 @@ status exports_write(struct report *report, double from, double to, struct error
                                "nothing can be exported: the result '%s' has no rows, whose lamp and camera the scenes "
                                "take over",
                                report->in.job->fit->result_file);
+    job_cloth_films(report->in.job->cloth, &e.films);
     fiber_set_z_range_m(&report->in.made->fiber, &e.z_low_m, &e.z_high_m);
     status s = fit_hair(&e, &part, err);
     for (size_t i = 0; i < N_FORMAT && s == STATUS_OK; i++)

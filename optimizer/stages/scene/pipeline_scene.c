@@ -188,6 +188,12 @@ status stage_scene(const struct cloth_job *in, struct made_cloth *out, struct er
         warning_send(&in->tools->warn, OPTION_CORRECTION, "%s",
                      "volume models see the densities and directions of the scan, which corrections of fibers do not "
                      "change: they are without effect on such models");
+    struct film_groups films;
+    job_cloth_films(in->cloth, &films);
+    if (films.n > 0 && wants_volume_scene(in))
+        warning_send(
+            &in->tools->warn, OPTION_CLOTH, "%s",
+            "volume models see the films and sequins of the cloth as fibers of their own material, not as metal");
     out->number = *in->number;
     status s = in->cloth->has_correction ? correct_fibers(in, out, err) : STATUS_OK;
     if (s == STATUS_OK) s = made_cloth_make_scene(in, out, err);

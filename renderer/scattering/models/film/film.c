@@ -57,16 +57,7 @@ static float eval_pdf(const struct scattering_state *s, const float wi[3], const
     return pdf;
 }
 
-static void eval(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
-{
-    eval_pdf(s, wi, wo, NULL, s_rgb, score);
-}
-
-static float pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
-{
-    float s_rgb[3];
-    return eval_pdf(s, wi, wo, weight_rgb, s_rgb, NULL);
-}
+SCATTERING_EVAL_AND_PDF
 
 static void sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
                    float wi[3])

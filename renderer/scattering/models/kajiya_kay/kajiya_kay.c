@@ -10,7 +10,7 @@
 #include "renderer/scattering/cone_lobe.h"
 #include "renderer/scattering/fiber_direction.h"
 #include "renderer/scattering/models/kajiya_kay/kajiya_kay_rows.def"
-#include "renderer/scattering/scattering.h"
+#include "renderer/scattering/scattering_state.h"
 
 #include <stdlib.h>
 
@@ -73,16 +73,7 @@ static float eval_pdf(const struct scattering_state *s, const float wi[3], const
     return p * m * (float)(0.5 * M_1_PI) + (1 - p) * fmaxf(cos_i, FIBER_COS_MIN) * diffuse;
 }
 
-static void eval(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
-{
-    eval_pdf(s, wi, wo, NULL, s_rgb, score);
-}
-
-static float pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
-{
-    float s_rgb[3];
-    return eval_pdf(s, wi, wo, weight_rgb, s_rgb, NULL);
-}
+SCATTERING_EVAL_AND_PDF
 
 static void sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
                    float wi[3])

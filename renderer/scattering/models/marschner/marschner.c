@@ -17,7 +17,7 @@
 #include "renderer/scattering/fiber_direction.h"
 #include "renderer/scattering/fresnel.h"
 #include "renderer/scattering/models/marschner/marschner_rows.def"
-#include "renderer/scattering/scattering.h"
+#include "renderer/scattering/scattering_state.h"
 #include "renderer/scattering/von_mises.h"
 
 #include <stdlib.h>
@@ -185,16 +185,7 @@ static float eval_pdf(const struct scattering_state *s, const float wi[3], const
     return pdf;
 }
 
-static void eval(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
-{
-    eval_pdf(s, wi, wo, NULL, s_rgb, score);
-}
-
-static float pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
-{
-    float s_rgb[3];
-    return eval_pdf(s, wi, wo, weight_rgb, s_rgb, NULL);
-}
+SCATTERING_EVAL_AND_PDF
 
 static void sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
                    float wi[3])

@@ -126,6 +126,13 @@ static void test_a_cloth_describes_itself(void **state)
                            "\"crimp\":{\"lower\":0.4,\"upper\":0.6,\"prior\":[0.5,0.1]},"
                            "\"yarns\":[{\"name\":\"a\",\"packing\":0.55},"
                            "{\"name\":\"b-2\",\"plies\":2,\"melange_with\":0,\"melange\":0.3}]"));
+    describes_itself(CLOTH(
+        "\"weave\":\"plain\",\"weft\":[1,2],"
+        "\"yarns\":[{\"name\":\"a\"},{\"name\":\"b\",\"fibers\":9,\"film_width_um\":90,\"film_wraps_per_m\":-4000,"
+        "\"film_metal\":\"gold\",\"film_surface\":\"brushed\",\"film_optics\":\"r_ohs\","
+        "\"film_grain_um\":12.5},{\"film_width_um\":200,\"film_color\":[1,0.5,0.001]}],"
+        "\"sequin_diameter_um\":900,\"sequin_spacing_um\":800,\"sequin_surface\":\"flakes\","
+        "\"sequin_roughness\":0.02"));
 }
 
 static void test_mistakes_are_named(void **state)
@@ -203,13 +210,46 @@ static void test_what_would_have_no_effect(void **state)
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"sequin_tilt_deg\":5"), "cloth.sequin_tilt_deg",
                              "without 'sequin_diameter_um'");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"film_width_um\":90,\"film_optics\":\"r_ghs\"}]"),
-                             "cloth.yarns[0].film_optics", "'smooth' is not rendered by waves");
+                             "cloth.yarns[0].film_optics", "not rendered by waves");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"sequin_diameter_um\":3000,\"sequin_surface\":\"flakes\","
                                    "\"sequin_optics\":\"ohs\""),
-                             "cloth.sequin_optics", "'flakes' is not rendered by waves");
+                             "cloth.sequin_optics", "not rendered by waves");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"film_width_um\":90,\"film_grain_um\":20}]"),
+                             "cloth.yarns[0].film_grain_um", "smooth");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"film_width_um\":90,\"film_metal\":\"gold\","
+                                   "\"film_color\":[1,1,1]}]"),
+                             "cloth.yarns[0].film_metal", "replaces");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"film_width_um\":90,\"film_surface\":\"noise\","
+                                   "\"film_optics\":\"ohs\",\"film_grain_um\":129}]"),
+                             "cloth.yarns[0].film_grain_um", "4 to 128");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"sequin_diameter_um\":3000,\"sequin_surface\":\"flakes\","
+                                   "\"sequin_roughness\":0.6"),
+                             "cloth.sequin_roughness", "at most 0.5");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"weft\":[0,1],\"yarns\":[{\"melange_with\":1},"
+                                   "{\"film_width_um\":90}]"),
+                             "cloth.yarns[0].melange_with", "no fibers");
     job_document_free(job_document_of_text(
         CLOTH("\"weave\":\"plain\",\"yarns\":[{\"film_width_um\":90,\"film_optics\":\"r_ghs\",\"film_surface\":"
               "\"noise\"}]")));
+}
+
+#define LAME(picture)                                                                                                  \
+    "{\"sample\":\"s\",\"cloth\":{\"weave\":\"plain\",\"yarns\":[{\"film_width_um\":90}]},"                            \
+    "\"measurements\":{\"file\":\"a.csv\"},\"pictures\":[{" picture "}]}"
+#define VIEW                                                                                                           \
+    "\"kind\":\"measurement\",\"on\":\"flat\",\"light_theta_deg\":20,\"light_phi_deg\":0,\"camera_theta_deg\":30,"     \
+    "\"camera_phi_deg\":180,"
+
+static void test_pictures_that_show_no_films(void **state)
+{
+    (void)state;
+    job_document_check_error(LAME("\"kind\":\"drape\",\"method\":\"dual\""), "pictures[0].method", "films");
+    job_document_check_error(LAME(VIEW "\"method\":\"fast\",\"deep_light\":\"cells\""), "pictures[0].deep_light",
+                             "films");
+    job_document_check_error(LAME(VIEW "\"method\":\"fast\",\"visibility\":\"tables\""), "pictures[0].visibility",
+                             "films");
+    job_document_free(job_document_of_text(LAME(VIEW "\"method\":\"fast\"")));
+    job_document_free(job_document_of_text(LAME(VIEW "\"method\":\"path\"")));
 }
 
 static void test_sizes_of_drafts(void **state)
@@ -263,6 +303,7 @@ int main(void)
         cmocka_unit_test(test_a_cloth_describes_itself),
         cmocka_unit_test(test_mistakes_are_named),
         cmocka_unit_test(test_what_would_have_no_effect),
+        cmocka_unit_test(test_pictures_that_show_no_films),
         cmocka_unit_test(test_sizes_of_drafts),
         cmocka_unit_test(test_drafts_that_fall_apart),
         cmocka_unit_test(test_fitted_numbers_without_effect),
