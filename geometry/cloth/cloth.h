@@ -41,11 +41,11 @@ struct cloth_report {
 
 /* Makes the fibers of d, which has passed cloth_description_check, at the values number[d->n_number] in the units of
  * files (NULL: the values of d). f must be initialised; its content is replaced. axis_class: 0 weft, 1 warp, 2 pile;
- * group: kind of yarn; films follow (cloth_film_group), which are not pushed apart. The lowest fiber surface is at z
- * = 0. report: NULL saves the time to measure it. The result does not depend on the number of threads; pool and
- * progress may be NULL. STATUS_INVALID, with err->field naming the number, for values outside of the catalogue's
- * range and for those that contradict each other (a crimp that yarns cannot bend to, threads that have no room);
- * STATUS_TOO_LARGE for more than 20 million vertices; STATUS_NO_MEMORY, STATUS_CANCELLED. */
+ * group: kind of yarn; films follow (cloth_film_group), which push fibers aside and stay where they are. The lowest
+ * fiber surface is at z = 0. report: NULL saves the time to measure it. The result does not depend on the number of
+ * threads; pool and progress may be NULL. STATUS_INVALID, with err->field naming the number, for values outside of the
+ * catalogue's range and for those that contradict each other (a crimp that yarns cannot bend to, threads that have no
+ * room); STATUS_TOO_LARGE for more than 20 million vertices; STATUS_NO_MEMORY, STATUS_CANCELLED. */
 status cloth_build(const struct cloth_description *d, const double *number, struct thread_pool *pool,
                    const struct progress *progress, struct fiber_set *f, struct cloth_report *report,
                    struct error *err);

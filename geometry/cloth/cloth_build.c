@@ -1,6 +1,6 @@
 #include "geometry/cloth/cloth.h"
 
-#include "geometry/cloth/cloth_film.h"
+#include "geometry/cloth/film_obstacle.h"
 #include "geometry/fibers/fiber_view.h"
 
 #include <math.h>
@@ -115,21 +115,33 @@ static status emit(struct cloth_work *w, struct fiber_set *f, struct error *err)
     return st == STATUS_OK ? cloth_film_append(w, -low_m, f, err) : st;
 }
 
+/* Pushes the strands apart and out of the films. */
+static status relax(struct cloth_work *w, struct thread_pool *pool, const struct progress *progress,
+                    struct strand_fit *fit, struct error *err)
+{
+    const struct strand_relax_option o = {.n_round = RELAX_ROUNDS, .rule = STRAND_SMOOTH};
+    const size_t n_strand = w->set.n_strand, n_node = w->set.n_node;
+    if (n_strand == 0) return STATUS_OK;
+    status st = film_obstacles_add(w, err);
+    if (st == STATUS_OK) st = strand_relax(&w->set, &o, pool, progress, fit, err);
+    w->set.n_strand = n_strand;
+    w->set.n_node = n_node;
+    return st;
+}
+
 status cloth_build(const struct cloth_description *d, const double *number, struct thread_pool *pool,
                    const struct progress *progress, struct fiber_set *f, struct cloth_report *report, struct error *err)
 {
     double own[CLOTH_MAX_NUMBER];
     for (size_t i = 0; i < d->n_number; i++) own[i] = number != NULL ? number[i] : d->number[i].value;
     struct cloth_work w = {.d = d, .number = own};
-    const struct strand_relax_option relax = {.n_round = RELAX_ROUNDS, .rule = STRAND_SMOOTH};
     struct strand_fit fit = {0};
     if (report != NULL) memset(report, 0, sizeof *report);
     status st = cloth_number_check(d, own, err);
     if (st != STATUS_OK) return st;
     kind_shapes(&w);
     st = make(&w, err);
-    if (st == STATUS_OK && w.set.n_strand > 0)
-        st = strand_relax(&w.set, &relax, pool, progress, report != NULL ? &fit : NULL, err);
+    if (st == STATUS_OK) st = relax(&w, pool, progress, report != NULL ? &fit : NULL, err);
     if (st == STATUS_OK) st = emit(&w, f, err);
     if (st == STATUS_OK) st = fiber_set_validate(f, err);
     if (st == STATUS_OK && report != NULL) st = report_fill(&w, &fit, f, report, err);

@@ -64,6 +64,8 @@ status cloth_film_wrap(struct cloth_work *w, size_t kind, const struct yarn *pat
     }
     const double by_length = nominal_m / (STEP_RADII * sqrt(half_m[0] * half_m[1]));
     const size_t n = (size_t)ceil(fmax(fmax(by_length, (double)path->n), NODES_PER_TURN * fabs(f.turns)));
+    const double *core_m = w->nominal[kind].core_half_m, /* of a film without a core its own half width, which turns */
+        around_m = 2.0 * M_PI * f.turns * sqrt(0.5 * (core_m[0] * core_m[0] + core_m[1] * core_m[1]));
     status s = reserve(w, n + 1, err);
     for (size_t i = 0; i <= n && s == STATUS_OK; i++) {
         struct film_node *node = &w->film.node[w->film.n++];
@@ -78,6 +80,7 @@ status cloth_film_wrap(struct cloth_work *w, size_t kind, const struct yarn *pat
                 (float)((after[(a + 1) % 3] * normal[(a + 2) % 3] - after[(a + 2) % 3] * normal[(a + 1) % 3]) /
                         (um * um));
         for (int a = 0; a < 2; a++) node->half_m[a] = (float)half_m[a];
+        node->step_m = (float)(hypot(nominal_m, around_m) / (double)n);
         node->group = (uint8_t)cloth_film_group(w->d, kind);
         node->is_first = i == 0;
         node->axis_class = path->axis_class;

@@ -1,6 +1,6 @@
 /* Films of a described cloth: a flat film around a yarn or in place of one, and sequins. Each is a chain of flat
- * sections, which is appended to the fibers once these have been pushed apart; films do not take part in that. Lengths
- * are in metres. Used only in this folder. */
+ * sections, which is appended to the fibers once these have been pushed apart, and out of the films (film_obstacle.h).
+ * Lengths are in metres. Used only in this folder. */
 #ifndef SELVEDGE_GEOMETRY_CLOTH_FILM_H
 #define SELVEDGE_GEOMETRY_CLOTH_FILM_H
 
@@ -10,6 +10,7 @@ struct film_node {
     double p[3];
     float axis[3];           /* along the long axis of the section, of any length but 0 */
     float half_m[2];         /* half width, half thickness */
+    float step_m;            /* distance of nodes at the description's own values; not of sequins */
     uint8_t group, is_first; /* is_first: a new chain begins here */
     uint8_t axis_class;
 };

@@ -21,6 +21,7 @@ struct strand {
     uint8_t axis_class;
     uint8_t group; /* of its fibers (fiber_set.h) */
     bool hair;     /* protrudes from a yarn */
+    bool fixed;    /* pushes others and stays where it is; only while strands are pushed apart */
     /* Length of an open strand, as a share, that belongs to group_of_start instead; a fiber begins there. */
     double start_share;
     uint8_t group_of_start;

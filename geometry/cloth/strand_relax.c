@@ -81,7 +81,7 @@ static void move_strands(void *context, size_t i_task, size_t i_thread)
     struct strand_set *s = r->s;
     size_t end = (i_task + 1) * STRANDS_PER_TASK < s->n_strand ? (i_task + 1) * STRANDS_PER_TASK : s->n_strand;
     for (size_t i = i_task * STRANDS_PER_TASK; i < end; i++)
-        strand_step(s, &s->strand[i], &r->moves, r->smoothing, r->work + i_thread * r->n_work);
+        if (!s->strand[i].fixed) strand_step(s, &s->strand[i], &r->moves, r->smoothing, r->work + i_thread * r->n_work);
 }
 
 static int ascending(const void *a, const void *b)
@@ -97,7 +97,7 @@ static double strain_p95(struct relax *r)
     for (size_t i = 0; i < r->s->n_node; i++) {
         const struct strand *t = &r->s->strand[r->strand_of[i]];
         double before[3], after[3], bend[3], chord2;
-        if (!neighbour(t, i, -1, r->s->p, before) || !neighbour(t, i, 1, r->s->p, after)) continue;
+        if (t->fixed || !neighbour(t, i, -1, r->s->p, before) || !neighbour(t, i, 1, r->s->p, after)) continue;
         double bend2 = strand_bend(before, r->s->p[i], after, bend, &chord2);
         if (chord2 > 0.0) r->contacts.depth[n++] = t->radius_m * sqrt(bend2) / chord2;
     }
@@ -108,9 +108,10 @@ static double strain_p95(struct relax *r)
 /* Measures the interpenetration and the sharp bends that are left at the present places. */
 static void measure(struct relax *r, struct strand_fit *fit)
 {
-    const size_t n_node = r->s->n_node;
+    size_t n_node = r->s->n_node;
     fit->overlap_mean = fit->overlap_max = 0.0;
-    for (size_t k = 0; k < n_node; k++) {
+    for (size_t i = 0; i < r->s->n_strand; i++) n_node -= r->s->strand[i].fixed ? r->s->strand[i].n : 0;
+    for (size_t k = 0; k < r->s->n_node; k++) {
         fit->overlap_mean += r->contacts.depth[k] / (double)n_node;
         fit->overlap_max = fmax(fit->overlap_max, r->contacts.depth[k]);
     }
