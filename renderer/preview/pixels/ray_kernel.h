@@ -18,6 +18,7 @@ struct ray_kernel {
     float over_var[2]; /* 1 / (2 sigma_x^2) along each axis */
     float shift[2];    /* eta / half along each axis */
     float wide[2];     /* of RAY_SQUARE: sigma_x eta sqrt(2) / half */
+    float middle[2];   /* of RAY_SQUARE: 2 erf(1 / wide) */
 };
 
 /* False: no ray of the pixel has met anything, so there is no filter. */
@@ -40,6 +41,7 @@ static inline bool ray_kernel_at(const struct ray_field *f, const struct ray_pix
         k->over_var[a] = 0.5f / (sigma * sigma);
         k->shift[a] = eta / f->half;
         k->wide[a] = sigma * fabsf(eta) / f->half * 1.41421356f;
+        k->middle[a] = f->window == RAY_SQUARE ? 2 * erff(1 / k->wide[a]) : 0;
     }
     return true;
 }
@@ -56,7 +58,7 @@ static inline float ray_weight_y(const struct ray_kernel *k, int a, float y)
     if (k->window == RAY_ABOVE) return 1;
     if (k->window == RAY_GAUSSIAN) return expf(-2 * y * y);
     if (!(k->wide[a] > 0)) return 1;
-    return 2 * erff(1 / k->wide[a]) / (erff((1 - y) / k->wide[a]) + erff((1 + y) / k->wide[a]));
+    return k->middle[a] / (erff((1 - y) / k->wide[a]) + erff((1 + y) / k->wide[a]));
 }
 
 static inline void ray_sum_add(struct ray_sum *to, float weight, const struct ray_sum *s)

@@ -10,7 +10,7 @@
 
 /* BINS_A_RAY: bins over the window for each ray along its axis, as published. Centres of windows go one window further
  * to both sides: beyond that no ray has a weight. AROUND: edge of a block with the reach around it. */
-enum { BINS_A_RAY = 4, BLOCK = 64, AROUND = BLOCK + 2 * RAY_REACH };
+enum { BINS_A_RAY = 4, MOST_BINS = BINS_A_RAY * RAY_MAX_SIDE, BLOCK = 64, AROUND = BLOCK + 2 * RAY_REACH };
 
 struct block {
     struct ray_sum *made; /* [AROUND][AROUND][n_made]: results of a pass at a pixel */
@@ -28,10 +28,7 @@ struct run {
     float *mean;
 };
 
-/* The place of bin i of centres, in [-2, 2]. */
-static float centre_of(const struct run *r, size_t i) { return 2 * ((float)i - (float)r->n_bin) / (float)r->n_bin; }
-
-/* n_centre: it lies beyond all. */
+/* Bin i of centres lies at 2 i / n_bin - 2. n_centre: it lies beyond all. */
 static size_t bin_of_centre(const struct run *r, float centre)
 {
     const float at = floorf(centre * 0.5f * (float)r->n_bin + (float)r->n_bin + 0.5f);
@@ -45,19 +42,37 @@ static size_t bin_of_y(const struct run *r, float y)
     return at >= 0 && at < (float)r->n_bin ? (size_t)at : r->n_bin;
 }
 
+/* The bin that ray j of a pixel goes to along an axis. */
+static size_t bin_of_ray(const struct run *r, const struct ray_pixel *p, int axis, size_t j)
+{
+    const struct ray_field *f = r->f;
+    if (f->window == RAY_ABOVE) return bin_of_y(r, ray_field_y(f, p, axis, j) / f->half);
+    return BINS_A_RAY * j + (size_t)(BINS_A_RAY * p->jitter[axis]);
+}
+
+/* Weights along an axis of places that lie in the same part of all bins: weight[n_bin]. A place in bin j has
+ * weight[m] in the window around the centre of bin j + n_bin - m, so one table serves all places and centres. */
+static void weigh_bins(const struct run *r, const struct ray_kernel *k, int axis, float part, float *weight)
+{
+    for (size_t m = 0; m < r->n_bin; m++)
+        weight[m] = ray_weight_y(k, axis, 2 * ((float)m + part) / (float)r->n_bin - 1);
+}
+
 /* Step 1a: out[n_centre][n_side]. */
 static void convolve_rays(const struct run *r, size_t i, struct ray_sum *out)
 {
     const struct ray_field *f = r->f;
     const struct ray_pixel *p = &f->pixel[i];
+    float weight[MOST_BINS];
     struct ray_kernel k;
     ray_kernel_at(f, p, false, &k);
-    for (size_t b = 0; b < r->n_centre; b++)
+    weigh_bins(r, &k, 0, fmodf(BINS_A_RAY * p->jitter[0], 1), weight);
+    for (size_t j2 = 0; j2 < f->n_side; j2++)
         for (size_t j1 = 0; j1 < f->n_side; j1++) {
-            const float weight = ray_weight_y(&k, 0, ray_field_y(f, p, 0, j1) / f->half - centre_of(r, b));
-            for (size_t j2 = 0; j2 < f->n_side && weight > 0; j2++)
-                ray_sum_ray(&out[b * f->n_side + j2], f, weight * ray_field_weight(f, p, j1, j2),
-                            ray_field_value(f, i, j1, j2));
+            struct ray_sum ray = {0};
+            struct ray_sum *to = out + (bin_of_ray(r, p, 0, j1) + r->n_bin) * f->n_side + j2;
+            ray_sum_ray(&ray, f, ray_field_weight(f, p, j1, j2), ray_field_value(f, i, j1, j2));
+            for (size_t m = 0; m < r->n_bin; m++) ray_sum_add(to - m * f->n_side, weight[m], &ray);
         }
 }
 
@@ -65,14 +80,13 @@ static void convolve_rays(const struct run *r, size_t i, struct ray_sum *out)
 static void convolve_bins(const struct run *r, size_t i, struct ray_sum *out)
 {
     const struct ray_sum *bin = r->between + i * r->n_bin;
+    float weight[MOST_BINS];
     struct ray_kernel k;
     ray_kernel_at(r->f, &r->f->pixel[i], false, &k);
-    for (size_t b = 0; b < r->n_centre; b++)
-        for (size_t j = 0; j < r->n_bin; j++) {
-            if (!(bin[j].all > 0)) continue;
-            const float y = 2 * ((float)j + 0.5f) / (float)r->n_bin - 1;
-            ray_sum_add(&out[b], ray_weight_y(&k, 1, y - centre_of(r, b)), &bin[j]);
-        }
+    weigh_bins(r, &k, 1, 0.5f, weight);
+    for (size_t j = 0; j < r->n_bin; j++)
+        for (size_t m = 0; m < r->n_bin && bin[j].all > 0; m++)
+            ray_sum_add(&out[j + r->n_bin - m], weight[m], &bin[j]);
 }
 
 /* The result of step 1a or 2a at pixel `at`, which lies around the block that starts at `corner`. */
@@ -100,7 +114,7 @@ static void keep_rays(const struct run *r, size_t i, struct ray_sum *out)
     const struct ray_pixel *p = &f->pixel[i];
     const struct ray_kernel plain = {.window = f->window};
     for (size_t j2 = 0; j2 < f->n_side; j2++) {
-        const size_t bin = bin_of_y(r, ray_field_y(f, p, 1, j2) / f->half);
+        const size_t bin = bin_of_ray(r, p, 1, j2);
         for (size_t j1 = 0; j1 < f->n_side && bin < r->n_bin; j1++)
             ray_sum_ray(&out[bin], f,
                         ray_weight_y(&plain, 0, ray_field_y(f, p, 0, j1) / f->half) * ray_field_weight(f, p, j1, j2),
