@@ -29,7 +29,7 @@ LONG_UNIT_TESTS = ["unit/renderer/scattering/test_scattering", "unit/renderer/fa
                    "unit/renderer/quick/test_dual_scattering", "unit/geometry/diameter/test_lumen_fill", "unit/geometry/reconstruct/test_lumen_refill",
                    "unit/renderer/fast/test_deep_light", "unit/renderer/glint/test_glint_surface",
                    "unit/renderer/mesh/test_drape", "unit/renderer/fast/test_fast_tables", "unit/geometry/fibers/test_shape_measure",
-                   "unit/geometry/weave/test_weave_detect", "unit/renderer/preview/test_sheared_filter", "unit/optimizer/report/test_hair_fit",
+                   "unit/geometry/weave/test_weave_detect", "unit/renderer/preview/test_ray_filter", "unit/optimizer/report/test_hair_fit",
                    "unit/geometry/volume/test_slice_tiles", "unit/renderer/fast/test_gaussian_light", "unit/geometry/orientation/test_alignment",
                    "unit/geometry/volume/test_bad_input", "unit/geometry/reconstruct/test_reconstruct", "unit/renderer/preview/test_appearance_table"]
 # limits in seconds of a core, and how long a test may use next to none

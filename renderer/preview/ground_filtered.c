@@ -2,7 +2,7 @@
  * picture looks its places up there. */
 #include "renderer/preview/ground_plane.h"
 #include "renderer/preview/ground_shadow.h"
-#include "renderer/preview/sheared_filter.h"
+#include "renderer/preview/pixels/ray_filter.h"
 #include "renderer/scene/scene_ray.h"
 
 #include <math.h>
@@ -15,8 +15,8 @@ enum { PIXEL_SAMPLES = 64, LAMP_PLACES = 2, MAX_GRID = 2048, OUTLINE = 16 };
 struct run {
     const struct ground_plane *g;
     const struct progress *progress;
-    struct light_field field;
-    double low[2]; /* x of the first receiver */
+    struct ray_field field; /* of places of the plane in place of pixels */
+    double low[2], cell[2]; /* x of the first receiver, and its change to the next one */
     float *visibility;
     struct image *im;
 };
@@ -62,9 +62,9 @@ static bool lay_grid(struct run *r, size_t n[2])
     for (int e = 0; e < 2; e++) {
         size_t inner = wanted[e] < MAX_GRID ? wanted[e] : MAX_GRID;
         if (!(high[e] > low[e])) return false;
-        r->field.cell[e] = (high[e] - low[e]) / (double)inner;
-        r->low[e] = low[e] + (0.5 - SHEARED_REACH) * r->field.cell[e];
-        n[e] = inner + 2 * SHEARED_REACH;
+        r->cell[e] = (high[e] - low[e]) / (double)inner;
+        r->low[e] = low[e] + (0.5 - RAY_REACH) * r->cell[e];
+        n[e] = inner + 2 * RAY_REACH;
     }
     return true;
 }
@@ -83,27 +83,38 @@ static bool look(struct run *r, size_t i, const double from[3], const double to[
     const double p[3] = {(double)hit.position_mm[0] + ray.offset_mm[0], (double)hit.position_mm[1] + ray.offset_mm[1],
                          (double)hit.position_mm[2]};
     double depth = lamp_coordinates(&r->g->lamp, p, x);
-    if (depth > 0) light_field_meet(&r->field, i, 1 / depth - 1 / receiver_depth);
+    const double slope = 1 / depth - 1 / receiver_depth;
+    if (depth > 0 && slope > 0) ray_pixel_meet(&r->field.pixel[i], (float)slope);
     return true;
 }
 
-static void sample_receiver(struct run *r, size_t i, const double x[2])
+static void sample_receiver(struct run *r, size_t i)
 {
-    struct light_field *f = &r->field;
+    struct ray_field *f = &r->field;
+    struct ray_pixel *to = &f->pixel[i];
     const struct lamp *l = &r->g->lamp;
+    const double cell[2] = {(double)(i % f->width) * r->cell[0], (double)(i / f->width) * r->cell[1]},
+                 x[2] = {r->low[0] + cell[0], r->low[1] + cell[1]};
     double p[3], on_lamp[3], unused[2];
     struct rng rng;
     ground_plane_random(r->g, i, true, &rng);
-    for (int e = 0; e < 2; e++) f->jitter[i][e] = (float)rng_double(&rng);
-    if (!point_at(r->g, x, p)) return;
-    double depth = lamp_coordinates(l, p, unused);
+    to->used = true;
+    for (int e = 0; e < 2; e++) {
+        to->x[e] = (float)cell[e];
+        to->step[e][e] = 1;
+        to->cell[e] = (float)r->cell[e];
+        to->jitter[e] = (float)rng_double(&rng);
+    }
+    const bool on_plane = point_at(r->g, x, p);
+    const double depth = on_plane ? lamp_coordinates(l, p, unused) : 0;
     for (size_t j = 0; j < f->n_side * f->n_side; j++) {
-        double y[2] = {light_field_place_mm(f, i, 0, j % f->n_side), light_field_place_mm(f, i, 1, j / f->n_side)};
+        const double y[2] = {(double)ray_field_y(f, to, 0, j % f->n_side),
+                             (double)ray_field_y(f, to, 1, j / f->n_side)};
         for (int a = 0; a < 3; a++)
             on_lamp[a] = (double)l->centre_mm[a] + y[0] * (double)l->edge[0][a] + y[1] * (double)l->edge[1][a];
-        if (!look(r, i, p, on_lamp, depth)) continue;
-        f->lit[i * f->n_side * f->n_side + j] = 0;
-        look(r, i, on_lamp, p, depth); /* for the occluder that is nearest to the lamp */
+        const bool hidden = on_plane && look(r, i, p, on_lamp, depth);
+        *ray_field_value(f, i, j % f->n_side, j / f->n_side) = hidden ? 0 : 1;
+        if (hidden) look(r, i, on_lamp, p, depth); /* for the occluder that is nearest to the lamp */
     }
 }
 
@@ -111,21 +122,19 @@ static void sample_row(void *context, size_t y, size_t i_thread)
 {
     (void)i_thread;
     struct run *r = context;
-    for (size_t x = 0; x < r->field.width && !progress_cancelled(r->progress); x++) {
-        double place[2] = {r->low[0] + (double)x * r->field.cell[0], r->low[1] + (double)y * r->field.cell[1]};
-        sample_receiver(r, y * r->field.width + x, place);
-    }
+    for (size_t x = 0; x < r->field.width && !progress_cancelled(r->progress); x++)
+        sample_receiver(r, y * r->field.width + x);
 }
 
 static float visibility_at(const struct run *r, const double p_mm[3])
 {
-    const struct light_field *f = &r->field;
+    const struct ray_field *f = &r->field;
     const size_t n[2] = {f->width, f->height};
     double x[2], part[2];
     size_t at[2];
     if (!(lamp_coordinates(&r->g->lamp, p_mm, x) > 0)) return 1;
     for (int e = 0; e < 2; e++) {
-        double u = fmin(fmax((x[e] - r->low[e]) / f->cell[e], 0), (double)(n[e] - 1));
+        double u = fmin(fmax((x[e] - r->low[e]) / r->cell[e], 0), (double)(n[e] - 1));
         at[e] = (size_t)fmin(u, (double)(n[e] - 2));
         part[e] = u - (double)at[e];
     }
@@ -173,15 +182,14 @@ static status make_visibility(struct run *r, const struct ground_filter *filter,
 {
     struct progress_part part[2] = {{r->progress, 0.0, 0.6}, {r->progress, 0.6, 0.2}};
     struct progress inner[2] = {progress_of_part(&part[0]), progress_of_part(&part[1])};
-    struct light_field *f = &r->field;
+    struct ray_field *f = &r->field;
     r->visibility = malloc(f->width * f->height * sizeof *r->visibility);
     if (r->visibility == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot filter a shadow: out of memory");
     status s = thread_pool_run(pool, f->height, sample_row, r, &inner[0]);
     if (s != STATUS_OK) return error_set(err, s, "sampling a shadow was cancelled");
-    s = light_field_smooth_slopes(f, err);
+    s = ray_field_smooth_slopes(f, err);
     if (s != STATUS_OK) return s;
-    return (filter->whole ? sheared_filter_whole : sheared_filter_passes)(f, SHEARED_SQUARE_LAMP, pool, &inner[1],
-                                                                          r->visibility, err);
+    return ray_filter(f, filter->whole ? RAY_WHOLE : RAY_PASSES, pool, &inner[1], r->visibility, err);
 }
 
 status ground_render_filtered(const struct ground_request *q, const struct ground_filter *filter,
@@ -199,17 +207,15 @@ status ground_render_filtered(const struct ground_request *q, const struct groun
                                          : "cannot filter the shadow of a Gaussian lamp, only that of a square one");
     if (s == STATUS_OK) s = image_init(im, q->width, q->height, 3, err);
     if (s != STATUS_OK || !lay_grid(&r, n)) return s;
-    const double cell[2] = {r.field.cell[0], r.field.cell[1]};
-    s = light_field_init(&r.field, n[0], n[1], filter->n_side, err);
-    for (int e = 0; e < 2; e++) r.field.cell[e] = cell[e];
-    r.field.half_side_mm = (double)g.lamp.half_side_mm;
+    s = ray_field_init(&r.field, n[0], n[1], filter->n_side, 1, err);
+    r.field.half = g.lamp.half_side_mm;
     if (s == STATUS_OK) s = make_visibility(&r, filter, pool, err);
     struct progress_part last = {progress, 0.8, 0.2};
     struct progress inner = progress_of_part(&last);
     if (s == STATUS_OK) s = thread_pool_run(pool, q->height, render_row, &r, &inner);
     if (s == STATUS_OK && progress_cancelled(progress)) s = STATUS_CANCELLED;
     if (s == STATUS_CANCELLED) error_set(err, s, "rendering the ground was cancelled");
-    light_field_release(&r.field);
+    ray_field_release(&r.field);
     free(r.visibility);
     if (s != STATUS_OK) image_release(im);
     return s;

@@ -5,8 +5,10 @@
  * A pixel has one receiver. x is its place along two axes, y the place that a ray goes to along the same axes, between
  * -half and half. The light f(x, y) along a ray does not change where x + s y stays the same, with the slope s:
  *
- *   soft shadow   x: as light_field.h; y: on the lamp, in mm; s = 1 / q - 1 / D. Of a lamp at infinity x is the place
- *                 across its direction in mm, y the tangent of the angle to it, and s the distance of the occluder.
+ *   soft shadow   x: the place as the lamp's centre sees it, along one of the lamp's edges, over the distance from the
+ *                 lamp's plane; y: on the lamp, in mm; s = 1 / q - 1 / D of an occluder at a distance q from the lamp's
+ *                 plane for a receiver at D. Of a lamp at infinity x is the place across its direction in mm, y the
+ *                 tangent of the angle to it, and s the distance of the occluder.
  *   lens          x: the pixel; y: on the lens, in mm; s: pixels by which the point that a ray meets moves, per mm.
  *   indirect      x: the place on the surface in mm, by `axis`; y: the slope v of the direction, v = tan theta (cos,
  *                 sin); s: the distance of the reflector above the surface in mm.
@@ -20,7 +22,7 @@
 #include <stddef.h>
 
 enum ray_window {
-    RAY_SQUARE,   /* all y count alike, and the filter makes up for places near the edge (sheared_kernel.h) */
+    RAY_SQUARE,   /* all y count alike, and the filter makes up for places near the edge (ray_kernel.h) */
     RAY_GAUSSIAN, /* the weight falls with a standard deviation of half / 2, as published */
     RAY_ABOVE     /* directions above a matte surface: y = v in [-5, 5]^2, weight 1 / (1 + v^2)^2 */
 };
@@ -78,8 +80,8 @@ static inline float ray_field_offset(const struct ray_field *f, const struct ray
 }
 /* Counts a slope, which is not 0. */
 void ray_pixel_meet(struct ray_pixel *p, float slope);
-/* Replaces slopes by their means over the 5 x 5 pixels around that have met anything, as light_field_smooth_slopes,
- * but not for receivers that ray_pixel_near refuses. STATUS_NO_MEMORY. */
+/* Replaces slopes by their means over the 5 x 5 pixels around that have met anything, but not of receivers that
+ * ray_pixel_near refuses: pixels near a shadow get the slopes of the occluder that casts it. STATUS_NO_MEMORY. */
 status ray_field_smooth_slopes(struct ray_field *f, struct error *err);
 /* Whether q is a neighbour of p on the same smooth surface: near its plane, and at most 20 degrees from its normal
  * (section 5.5). */

@@ -2,8 +2,13 @@
  * the values of a pixel's rays, with the weights of window and directions. Pixels without a receiver get 0, and pixels
  * whose rays have met nothing the mean of their own rays. The bits do not depend on the number of threads.
  *
- * Sheared filtering counts the ray of a neighbour at x' to the place y' as one of the pixel's own to the place
- * y = y' + eta (x' - x), with a Gaussian weight of x' - x (equations 2.23 to 2.25; sheared_filter.h for a misprint).
+ * Sheared filtering (by Egan, Hecht, Durand and Ramamoorthi 2011) follows the light of a pixel to its neighbours: an
+ * occluder that hides a place y of the lamp from one receiver hides a shifted place from the next one. The ray of a
+ * neighbour at x' to the place y' counts as one of the pixel's own to the place y = y' + eta (x' - x), with a Gaussian
+ * weight of x' - x and the window's weight at y, along each axis (equations 2.23 to 2.25). eta is the reciprocal of the
+ * harmonic mean of the least and the greatest slope at x. (Equation 2.25 prints half of the harmonic mean itself, with
+ * a minus sign.)
+ *
  * Axis-aligned filtering takes means of pixels (Mehta, Wang and Ramamoorthi 2012) with a Gaussian of half |s_min| / 6,
  * where s_min is the slope nearest to 0 (their k = 3 and mu = 1). Pixels whose slopes have both signs have no shear:
  * the four passes give them the mean of their own rays, and the other filters the narrowest Gaussian, of a quarter of

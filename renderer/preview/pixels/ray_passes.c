@@ -85,8 +85,7 @@ static void convolve_bins(const struct run *r, size_t i, struct ray_sum *out)
     ray_kernel_at(r->f, &r->f->pixel[i], false, &k);
     weigh_bins(r, &k, 1, 0.5f, weight);
     for (size_t j = 0; j < r->n_bin; j++)
-        for (size_t m = 0; m < r->n_bin && bin[j].all > 0; m++)
-            ray_sum_add(&out[j + r->n_bin - m], weight[m], &bin[j]);
+        for (size_t m = 0; m < r->n_bin && bin[j].all > 0; m++) ray_sum_add(&out[j + r->n_bin - m], weight[m], &bin[j]);
 }
 
 /* The result of step 1a or 2a at pixel `at`, which lies around the block that starts at `corner`. */

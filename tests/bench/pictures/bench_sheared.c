@@ -1,25 +1,50 @@
-/* Sheared filtering of previews: rays that a pixel takes for equal errors, and time. On folds of cloth (a matte
- * appearance, 128 x 128 pixels). Prints one JSON object on each line, and the errors to standard error.
+/* Sheared filtering of previews: rays and time that other ways take for the same error. On folds of cloth and on a
+ * drape over a ball, both with a matte appearance, 128 x 128 pixels. Prints one JSON object on each line, and tables to
+ * standard error.
  *
- *   sheared.<effect>.rms         Root mean square error of 3 x 3 rays a pixel in four passes, over the mean.
- *   sheared.<effect>.raw_ratio   Rays of pixels without a filter, and sheared.<effect>.axis_ratio of the axis-aligned
- *                                filter, for the error of four passes with 3 x 3 rays, over 9; 64 / 9 where 8 x 8 rays
- *                                do not reach it.
- *   sheared.passes_speedup       Processor seconds of the whole sum over four passes, both for 4 x 4 rays of the lamp.
+ *   sheared.<effect>.rms         Folds: root mean square error of 3 x 3 rays a pixel in four passes, over the mean.
+ *   sheared.<effect>.raw_ratio   Folds: rays of pixels without a filter, and sheared.<effect>.axis_ratio of the
+ *                                axis-aligned filter, for the error of four passes with 3 x 3 rays, over 9; the most
+ *                                rays that were tried over 9 where they do not reach it.
+ *   sheared.time_ratio_<effect>_<way>  Drape: processor seconds of a way (raw, axis, whole) over those of the four
+ *                                passes with 3 x 3 rays, at their error. Seconds are those of the rays and the filter
+ *                                of one effect; those of the most rays where the error is not reached.
+ *   sheared.passes_speedup       Folds: processor seconds of the whole sum over the four passes, both for 4 x 4 rays of
+ *                                the lamp.
  *
  * effect: shadow (radiance of the lamp's light), bounce (irradiance of other folds), lens.
+ *
+ * The reference is the mean of TRUTH_SEEDS pictures of 8 x 8 rays without a filter. Their scatter gives its variance,
+ * which is taken off squared errors. Noisy pixels are those where it is not 0: penumbrae.
  */
 #include "base/process.h"
+#include "renderer/mesh/mesh_drape.h"
 #include "renderer/preview/proxy/proxy_layers.h"
 #include "tests/support/cloth/proxy_cloth.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
-enum { EDGE = 128, N = 3 * EDGE * EDGE, TRUTH_SEEDS = 12, MOST_SIDE = 8, N_EFFECT = 3 };
+/* Ways without a filter have up to MOST_RAW pictures of 8 x 8 rays. */
+enum { EDGE = 128, N = 3 * EDGE * EDGE, TRUTH_SEEDS = 16, MOST_SIDE = 8, MOST_RAW = 6, N_STEP = MOST_SIDE + MOST_RAW };
+enum { N_EFFECT = 3, N_WAY = 4, SIDE = 3, WHOLE_SIDE = 4 };
 static const char *const effect[N_EFFECT] = {"shadow", "bounce", "lens"};
-static float value[N_EFFECT][N], truth[N_EFFECT][N];
+static const enum ray_filter_way way[N_WAY] = {RAY_OWN, RAY_AXIS, RAY_WHOLE, RAY_PASSES};
+static const char *const way_name[N_WAY] = {"raw", "axis", "whole", "passes"};
+
+struct step {
+    double rays, error, inside, outside, seconds;
+};
+
+struct measured {
+    int n_step;
+    struct step step[N_STEP];
+};
+
+static float value[N_EFFECT][N], pooled[N_EFFECT][N];
+static double truth[N_EFFECT][N], truth_var[N_EFFECT][N];
 
 static void check(status s, const struct error *err)
 {
@@ -28,16 +53,23 @@ static void check(status s, const struct error *err)
     exit(1);
 }
 
-static void make_all(const struct proxy_request *q)
+/* Writes all layers, and adds the processor seconds of each. */
+static void make_all(const struct proxy_request *q, double seconds[N_EFFECT])
 {
     struct proxy_surface s;
     struct proxy_layers l;
     struct error err = {0};
+    double at[N_EFFECT + 1];
     check(proxy_surface_init(&s, q, &err), &err);
     check(proxy_layers_init(&s, NULL, NULL, &l, &err), &err);
+    at[0] = process_use().cpu_s;
     check(proxy_shadow_make(&s, NULL, NULL, &l, &err), &err);
+    at[1] = process_use().cpu_s;
     check(proxy_bounce_make(&s, NULL, NULL, &l, &err), &err);
+    at[2] = process_use().cpu_s;
     check(proxy_lens_make(&s, &l, NULL, NULL, value[2], &err), &err);
+    at[3] = process_use().cpu_s;
+    for (int k = 0; k < N_EFFECT; k++) seconds[k] += at[k + 1] - at[k];
     for (size_t i = 0; i < N / 3; i++) {
         double direct[3] = {0, 0, 0};
         if (l.receiver[i].used) proxy_surface_direct(&s, &l.place[i], direct);
@@ -49,86 +81,160 @@ static void make_all(const struct proxy_request *q)
     proxy_layers_release(&l);
 }
 
-static double error_of(int k)
+static void make_truth(struct proxy_request q)
 {
-    double sum = 0, mean = 0;
+    double unused[N_EFFECT] = {0};
+    q.n_side = MOST_SIDE;
+    q.way = RAY_OWN;
+    memset(truth, 0, sizeof truth);
+    memset(truth_var, 0, sizeof truth_var);
+    for (int seed = 0; seed < TRUTH_SEEDS; seed++) {
+        q.seed = 100 + (uint64_t)seed;
+        make_all(&q, unused);
+        for (int k = 0; k < N_EFFECT; k++)
+            for (size_t i = 0; i < N; i++) {
+                const double v = (double)value[k][i], from = v - truth[k][i];
+                truth[k][i] += from / (seed + 1);
+                truth_var[k][i] += from * (v - truth[k][i]);
+            }
+    }
+    for (int k = 0; k < N_EFFECT; k++)
+        for (size_t i = 0; i < N; i++) truth_var[k][i] /= (double)TRUTH_SEEDS * (TRUTH_SEEDS - 1);
+}
+
+/* Errors over the mean of the picture: of all pixels, of noisy ones, and of the others. */
+static void errors_of(int k, const float *v, struct step *to)
+{
+    double sum[2] = {0, 0}, n[2] = {1e-9, 1e-9}, mean = 0;
+    for (size_t i = 0; i < N; i++) mean += truth[k][i] / N;
     for (size_t i = 0; i < N; i++) {
-        sum += pow((double)value[k][i] - (double)truth[k][i], 2) / N;
-        mean += (double)truth[k][i] / N;
+        const int noisy = truth_var[k][i] > 1e-10 * mean * mean;
+        sum[noisy] += pow((double)v[i] - truth[k][i], 2) - truth_var[k][i];
+        n[noisy]++;
     }
-    return sqrt(sum) / mean;
+    to->error = sqrt(fmax(sum[0] + sum[1], 0) / N) / mean;
+    to->inside = sqrt(fmax(sum[1], 0) / n[1]) / mean;
+    to->outside = sqrt(fmax(sum[0], 0) / n[0]) / mean;
 }
 
-/* Rays for an error, between the numbers of rays as powers of it; the most for errors that are not reached. */
-static double rays_for(double error, double by_side[MOST_SIDE + 1])
+/* Measures a way with 1 to MOST_SIDE squared rays, and without a filter with means of several pictures, too. */
+static void measure(struct proxy_request q, enum ray_filter_way w, int most_side, struct measured m[N_EFFECT])
 {
-    for (int side = 2; side <= MOST_SIDE; side++) {
-        if (by_side[side] > error) continue;
-        if (by_side[side - 1] <= error) return (side - 1) * (side - 1);
-        const double part = log(error / by_side[side - 1]) / log(by_side[side] / by_side[side - 1]);
-        return pow(side - 1 + 1e-9, 2) * pow((double)side / (side - 1), 2 * part);
+    double pool_s[N_EFFECT] = {0};
+    q.way = w;
+    for (int step = 0; step < (w == RAY_OWN ? N_STEP : most_side); step++) {
+        const int n_pool = step < MOST_SIDE ? 1 : step - MOST_SIDE + 2;
+        double seconds[N_EFFECT] = {0};
+        q.n_side = step < MOST_SIDE ? (size_t)step + 1 : MOST_SIDE;
+        q.seed = 4 + (uint64_t)n_pool;
+        make_all(&q, seconds);
+        for (int k = 0; k < N_EFFECT; k++) {
+            struct step *to = &m[k].step[step];
+            pool_s[k] = n_pool == 1 ? seconds[k] : pool_s[k] + seconds[k];
+            for (size_t i = 0; i < N; i++)
+                pooled[k][i] = n_pool == 1 ? value[k][i] : pooled[k][i] + (value[k][i] - pooled[k][i]) / (float)n_pool;
+            *to = (struct step){.rays = (double)(q.n_side * q.n_side) * n_pool, .seconds = pool_s[k]};
+            errors_of(k, pooled[k], to);
+            m[k].n_step = step + 1;
+        }
     }
-    return MOST_SIDE * MOST_SIDE;
 }
 
-static void print(const char *name, const char *what, double v, const char *unit, const char *better)
+/* Rays and seconds for an error, between the steps as powers of it; those of the last where none reaches it. */
+static void reach(const struct measured *m, double error, double *rays, double *seconds)
 {
-    printf("{\"name\": \"sheared.%s%s\", \"value\": %.4g, \"unit\": \"%s\", \"better\": \"%s\"}\n", name, what, v, unit,
+    const struct step *last = &m->step[m->n_step - 1];
+    *rays = last->rays;
+    *seconds = last->seconds;
+    for (int i = 0; i < m->n_step; i++) {
+        const struct step *s = &m->step[i];
+        if (s->error > error) continue;
+        const double part = i > 0 ? log(error / s[-1].error) / log(s->error / s[-1].error) : 1;
+        *rays = i > 0 ? s[-1].rays * pow(s->rays / s[-1].rays, part) : s->rays;
+        *seconds = i > 0 ? s[-1].seconds * pow(s->seconds / s[-1].seconds, part) : s->seconds;
+        return;
+    }
+}
+
+static void print(const char *name, double v, const char *unit, const char *better)
+{
+    printf("{\"name\": \"sheared.%s\", \"value\": %.4g, \"unit\": \"%s\", \"better\": \"%s\"}\n", name, v, unit,
            better);
 }
 
-static double seconds_of_shadow(struct proxy_request q, enum ray_filter_way way)
+static void print_rays(struct measured m[N_WAY][N_EFFECT])
 {
-    struct proxy_surface s;
-    struct proxy_layers l;
+    for (int k = 0; k < N_EFFECT; k++) {
+        const double error = m[3][k].step[SIDE - 1].error;
+        char name[64];
+        snprintf(name, sizeof name, "%s.rms", effect[k]);
+        print(name, error, "relative", "lower");
+        for (int w = 0; w < 2; w++) {
+            double rays, seconds;
+            reach(&m[w][k], error, &rays, &seconds);
+            snprintf(name, sizeof name, "%s.%s_ratio", effect[k], way_name[w]);
+            print(name, rays / (SIDE * SIDE), "ratio", "higher");
+        }
+    }
+}
+
+static void print_times(struct measured m[N_WAY][N_EFFECT])
+{
+    for (int k = 0; k < N_EFFECT; k++)
+        for (int w = 0; w < 3; w++) {
+            const struct step *passes = &m[3][k].step[SIDE - 1];
+            double rays, seconds;
+            char name[64];
+            reach(&m[w][k], passes->error, &rays, &seconds);
+            snprintf(name, sizeof name, "time_ratio_%s_%s", effect[k], way_name[w]);
+            print(name, seconds / passes->seconds, "ratio", "higher");
+        }
+}
+
+static void measure_all(const struct proxy_request *q, const char *cloth, struct measured m[N_WAY][N_EFFECT])
+{
+    memset(m, 0, N_WAY * sizeof *m);
+    make_truth(*q);
+    for (int w = 0; w < N_WAY; w++) measure(*q, way[w], way[w] == RAY_WHOLE ? WHOLE_SIDE : MOST_SIDE, m[w]);
+    for (int k = 0; k < N_EFFECT; k++)
+        for (int w = 0; w < N_WAY; w++)
+            for (int i = 0; i < m[w][k].n_step; i++) {
+                const struct step *s = &m[w][k].step[i];
+                fprintf(stderr, "%s %s %-6s %3.0f rays: error %.4f, of noisy pixels %.4f, of others %.4f, %.3f s\n",
+                        cloth, effect[k], way_name[w], s->rays, s->error, s->inside, s->outside, s->seconds);
+            }
+}
+
+static void drape(struct proxy_cloth *c)
+{
+    struct mesh m = {0};
     struct error err = {0};
-    q.way = way;
-    check(proxy_surface_init(&s, &q, &err), &err);
-    check(proxy_layers_init(&s, NULL, NULL, &l, &err), &err);
-    const double before_s = process_use().cpu_s;
-    check(proxy_shadow_make(&s, NULL, NULL, &l, &err), &err);
-    proxy_layers_release(&l);
-    return process_use().cpu_s - before_s;
+    scene_free(c->bent);
+    check(mesh_drape(60, 15, NULL, &m, &err), &err);
+    check(scene_bend(c->flat.scene, &m, false, &c->bent, &err), &err);
+    mesh_release(&m);
+    c->q.scene = c->bent;
+    c->view.light_theta_rad = c->view.camera_theta_rad = 0.9;
+    c->view.light_phi_rad = 2.5;
+    c->view.crop_m = 0.065;
 }
 
 int main(void)
 {
-    static const enum ray_filter_way way[3] = {RAY_OWN, RAY_AXIS, RAY_PASSES};
     struct proxy_cloth c;
-    double error[3][N_EFFECT][MOST_SIDE + 1];
+    static struct measured m[N_WAY][N_EFFECT];
     proxy_cloth_init(&c, true);
     c.view.aperture_m = 0.02;
     c.q.width = c.q.height = EDGE;
-    c.q.n_side = MOST_SIDE;
-    c.q.way = RAY_OWN;
-    for (int seed = 0; seed < TRUTH_SEEDS; seed++) {
-        c.q.seed = 100 + (uint64_t)seed;
-        make_all(&c.q);
-        for (int k = 0; k < N_EFFECT; k++)
-            for (size_t i = 0; i < N; i++) truth[k][i] += value[k][i] / TRUTH_SEEDS;
-    }
-    c.q.seed = 5;
-    for (int w = 0; w < 3; w++)
-        for (size_t side = 1; side <= MOST_SIDE; side++) {
-            c.q.n_side = side;
-            c.q.way = way[w];
-            make_all(&c.q);
-            for (int k = 0; k < N_EFFECT; k++) error[w][k][side] = error_of(k);
-        }
-    for (int k = 0; k < N_EFFECT; k++) {
-        for (int side = 1; side <= MOST_SIDE; side++)
-            fprintf(stderr, "%s %2d rays: own %.4f, by axes %.4f, four passes %.4f\n", effect[k], side * side,
-                    error[0][k][side], error[1][k][side], error[2][k][side]);
-        print(effect[k], ".rms", error[2][k][3], "relative", "lower");
-        print(effect[k], ".raw_ratio", rays_for(error[2][k][3], error[0][k]) / 9, "ratio", "higher");
-        print(effect[k], ".axis_ratio", rays_for(error[2][k][3], error[1][k]) / 9, "ratio", "higher");
-    }
-    c.q.n_side = 4;
-    const double own_s = seconds_of_shadow(c.q, RAY_OWN), passes_s = seconds_of_shadow(c.q, RAY_PASSES) - own_s,
-                 whole_s = seconds_of_shadow(c.q, RAY_WHOLE) - own_s;
-    fprintf(stderr, "seconds: rays %.3f, four passes %.3f, whole sum %.3f, by axes %.3f\n", own_s, passes_s, whole_s,
-            seconds_of_shadow(c.q, RAY_AXIS) - own_s);
-    print("passes_speedup", "", whole_s / passes_s, "ratio", "higher");
+    measure_all(&c.q, "folds", m);
+    print_rays(m);
+    const double rays_s = m[0][0].step[WHOLE_SIDE - 1].seconds;
+    print("passes_speedup",
+          (m[2][0].step[WHOLE_SIDE - 1].seconds - rays_s) / (m[3][0].step[WHOLE_SIDE - 1].seconds - rays_s), "ratio",
+          "higher");
+    drape(&c);
+    measure_all(&c.q, "drape", m);
+    print_times(m);
     proxy_cloth_release(&c);
     return 0;
 }
