@@ -6,16 +6,16 @@
  *   sheared.<effect>.raw_ratio   Folds: rays of pixels without a filter, and sheared.<effect>.axis_ratio of the
  *                                axis-aligned filter, for the error of four passes with 3 x 3 rays, over 9; the most
  *                                rays that were tried over 9 where they do not reach it.
- *   sheared.time_ratio_<effect>_<way>  Drape: processor seconds of a way (raw, axis, whole) over those of the four
- *                                passes with 3 x 3 rays, at their error. Seconds are those of the rays and the filter
- *                                of one effect; those of the most rays where the error is not reached.
+ *   sheared.time_ratio_<effect>_<way>  Drape: processor seconds of a way (raw, axis, whole) over the seconds of the
+ *                                four passes with 3 x 3 rays, at their error. Seconds count the rays and the filter of
+ *                                one effect; where the error is not reached, with the most rays that were tried.
  *   sheared.passes_speedup       Folds: processor seconds of the whole sum over the four passes, both for 4 x 4 rays of
  *                                the lamp.
  *
  * effect: shadow (radiance of the lamp's light), bounce (irradiance of other folds), lens.
  *
  * The reference is the mean of TRUTH_SEEDS pictures of 8 x 8 rays without a filter. Their scatter gives its variance,
- * which is taken off squared errors. Noisy pixels are those where it is not 0: penumbrae.
+ * which is taken off squared errors. Where it is not 0, pixels are noisy: penumbrae.
  */
 #include "base/process.h"
 #include "renderer/mesh/mesh_drape.h"
@@ -140,7 +140,7 @@ static void measure(struct proxy_request q, enum ray_filter_way w, int most_side
     }
 }
 
-/* Rays and seconds for an error, between the steps as powers of it; those of the last where none reaches it. */
+/* Rays and seconds for an error, between the steps as powers of it; of the last step where none reaches it. */
 static void reach(const struct measured *m, double error, double *rays, double *seconds)
 {
     const struct step *last = &m->step[m->n_step - 1];
