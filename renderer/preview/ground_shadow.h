@@ -19,7 +19,7 @@ double ground_below(const struct scene *bent, double gap_mm);
  * the number of threads. */
 status ground_render(const struct ground_request *q, struct thread_pool *pool, const struct progress *progress,
                      struct image *im, struct error *err);
-/* The same without noise of the lamp's rays, by sheared filtering (sheared_filter.h) on a grid of the plane with
+/* The same without noise of the lamp's rays, by sheared filtering (pixels/ray_filter.h) on a grid of the plane with
  * n_side * n_side rays a place: a preview. whole: by the sum over four dimensions in place of the four passes. im: rgb.
  * STATUS_INVALID also for a directional lamp, whose shadow is sharp. */
 struct ground_filter {
