@@ -165,8 +165,8 @@ static double weigh_lamp(const struct proxy_surface *s, const struct proxy_place
     return fmin(n_above, 24 * 24 - n_above) / (24 * 24);
 }
 
-/* Where the plane of the surface cuts the lamp. The lesser side is seen at 4 x 4 places and the greater one by rays that
- * count alike: an error of 0.05, where one side alone has 0.25. */
+/* Where the plane of the surface cuts the lamp. The lesser side is seen at 4 x 4 places and the greater one by rays
+ * that count alike: an error of 0.05, where one side alone has 0.25. */
 static void a_lamp_in_the_plane_of_the_cloth_counts_both_sides(void **state)
 {
     (void)state;
