@@ -77,6 +77,17 @@ void drawn_cylinder_axes(const struct drawn_cylinder *d, double forward[3], doub
     }
 }
 
+/* Light that the eye sees along a ray: the sheet, else the cylinder, else the background. */
+static double seen_along(const struct drawn_cylinder *d, const double ray[3])
+{
+    double p[3];
+    if (d->sheet != NULL && ray[2] < 0.0) {
+        const double t = -d->eye[2] / ray[2], light = d->sheet(d->eye[0] + t * ray[0], d->eye[1] + t * ray[1]);
+        if (!isnan(light)) return light;
+    }
+    return drawn_cylinder_meet(d->radius, d->eye, ray, p) ? seen(d, p) : d->background;
+}
+
 void drawn_cylinder_draw(const struct drawn_cylinder *d, struct image *im)
 {
     enum { RAYS = 3 };
@@ -89,9 +100,9 @@ void drawn_cylinder_draw(const struct drawn_cylinder *d, struct image *im)
         for (size_t k = 0; k < RAYS * RAYS; k++) {
             const double x = (double)(i % d->width) + ((double)(k % RAYS) + 0.5) / RAYS - 0.5 * (double)d->width,
                          y = (double)(i / d->width) + ((double)(k / RAYS) + 0.5) / RAYS - 0.5 * (double)d->height;
-            double ray[3], p[3];
+            double ray[3];
             for (int a = 0; a < 3; a++) ray[a] = forward[a] + x / focal * right[a] + y / focal * down[a];
-            sum += drawn_cylinder_meet(d->radius, d->eye, ray, p) ? seen(d, p) : d->background;
+            sum += seen_along(d, ray);
         }
         for (size_t c = 0; c < 3; c++) im->pixel[3 * i + c] = (float)(sum / (RAYS * RAYS) * (1.0 - 0.2 * (double)c));
     }

@@ -12,6 +12,8 @@ struct drawn_cylinder {
     double px_per_mm, roll;                /* roll: of the camera about its axis */
     double background;
     size_t width, height;
+    double (*sheet)(double x,
+                    double y); /* light of a sheet in the plane z = 0, NaN where it has a hole; NULL: no sheet */
 };
 
 /* The place at a distance in the direction (theta, phi) from the orbit center. */

@@ -6,6 +6,7 @@
 #include "optimizer/job/checks/option_checks.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_fit_option.h"
+#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/document/job_sections.h"
@@ -71,6 +72,12 @@ status job_check_texture(const struct option_value *v, struct error *err)
     if (v->section->rows->measurement_file[0] != '\0')
         return error_set_field(err, STATUS_INVALID, v->path, "'%s' needs photographs: a table of means has no texture",
                                v->path);
+    size_t n_flat = 0;
+    for (size_t i = 0; i < v->section->rows->n_photograph; i++)
+        n_flat += !job_photograph_is_cylinder(&v->section->rows->photograph[i]);
+    if (v->section->rows->n_photograph > 0 && n_flat == 0)
+        return error_set_field(err, STATUS_INVALID, v->path,
+                               "'%s' needs a photograph of flat cloth: columns of cylinders have no texture", v->path);
     if (fit->texture_weight > 0.0 && (method_catalogue_find(fit->method)->takes & METHOD_TAKES_TEXTURE) == 0)
         return error_set_field(err, STATUS_INVALID, v->path,
                                "'%s' with a weight needs the method '%s': '%s' has no such terms", v->path,

@@ -127,8 +127,9 @@ static status find_outline(struct wrapped *w, const struct image *im, struct err
         s = cylinder_edges_of_points(c->axis, c->edges_px, &w->edges, err);
         if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_CYLINDER_EDGES);
     } else if ((s = search(w, im, &why)) == STATUS_NOT_FOUND && w->marked) {
+        const bool in_the_dark = w->edges.dark_background && dark_side(&w->view) != NULL;
         w->edges = by_markers;
-        if (dark_side(&w->view) == NULL)
+        if (!in_the_dark)
             warning_send(
                 w->process->warn, OPTION_NONE,
                 "photograph '%s': the markers say where its cylinder is, but it was not found there (%s): check "

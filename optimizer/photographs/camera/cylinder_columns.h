@@ -17,7 +17,8 @@ struct job_setup;
  * step. Columns that the lamp or camera sees at more than cylinder_limit_deg, and those narrower than two pixels, are
  * left out with a warning. STATUS_INVALID, field an option id: no outline, or one whose side lies in shadow before a
  * dark background; a radius that contradicts the lens or the markers by more than 5 %; no column left; more rows than
- * JOB_MAX_PHOTOGRAPH. */
+ * JOB_MAX_PHOTOGRAPH. With markers an outline that is not found where they promise it, as of a radius that is stated
+ * too small, gives a warning that asks for the radius, and the outline by the markers is taken. */
 status cylinder_columns_make(const struct photograph_process *k, const struct job_setup *setup, struct job_rows *rows,
                              const char *folder, struct error *err);
 

@@ -24,7 +24,7 @@ status cylinder_edges_of_points(enum job_axis axis, const double px[8], struct c
 /* Finds the outline in a picture that shows the cylinder before an even background, which must be seen on both sides.
  * origin_px: place of the picture's upper left corner, which is added. In bands across the axis the first departure
  * from the background on each side is taken at its steepest place; lines are fitted to at least 60 % of the bands.
- * STATUS_NOT_FOUND with the reason. */
+ * STATUS_NOT_FOUND with the reason; dark_background is set all the same. */
 status cylinder_edges_find(const struct image *im, const double origin_px[2], enum job_axis axis,
                            struct cylinder_edges *e, struct error *err);
 /* Pixels between the silhouettes at the height v, perpendicular to them. */

@@ -4,12 +4,22 @@
 #include <stdlib.h>
 
 enum { MAX_COLUMN = 720 };
-static const double of_median = 1.4826, of_difference = 70.0;
+static const double of_median = 1.4826, of_difference = 70.0, uneven_step = 0.25;
 
 static int compare_double(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
     return x < y ? -1 : x > y;
+}
+
+/* Returns whether the five columns about column[0] are at equal steps: a column that was left out between them shows in
+ * their angles. */
+static bool at_equal_steps(const struct observation *column)
+{
+    const double step = 0.25 * (column[2].column.angle_deg - column[-2].column.angle_deg);
+    for (int k = -2; k < 2; k++)
+        if (fabs(column[k + 1].column.angle_deg - column[k].column.angle_deg - step) > uneven_step * step) return false;
+    return true;
 }
 
 /* Relative error of the n columns by their fourth differences; 0 for fewer than five. */
@@ -18,6 +28,7 @@ static double scatter(const struct observation *column, size_t n, size_t c)
     double value[MAX_COLUMN];
     size_t n_value = 0;
     for (size_t i = 2; i + 2 < n; i++) {
+        if (!at_equal_steps(&column[i])) continue;
         const double d = column[i - 2].mean_rgb[c] - 4.0 * column[i - 1].mean_rgb[c] + 6.0 * column[i].mean_rgb[c] -
                          4.0 * column[i + 1].mean_rgb[c] + column[i + 2].mean_rgb[c];
         if (column[i].mean_rgb[c] > 0.0) value[n_value++] = fabs(d) / column[i].mean_rgb[c];

@@ -305,6 +305,14 @@ static void test_refused(void **state)
     job_document_check_error(
         PHOTO_OF("\"set\":\"fit\",\"light_theta_deg\":1,\"camera_theta_deg\":1,\"cylinder_step_deg\":6"),
         "photographs[0].cylinder_step_deg", "cylinder_radius_mm");
+    static const char *const roll =
+        "{\"sample\":\"s\"," VOLUME ",\"photographs\":[{\"file\":\"roll.exr\",\"set\":\"fit\"," VIEW
+        ",\"cylinder_radius_mm\":15}%s],\"fit\":{\"texture\":{\"block_mm\":1}}}";
+    char text[1000];
+    snprintf(text, sizeof text, roll, "");
+    job_document_check_error(text, "fit.texture", "flat cloth");
+    snprintf(text, sizeof text, roll, "," PHOTO);
+    job_document_free(job_document_of_text(text));
 }
 
 /* Columns that scatter by 2 % about a cubic curve state an error of about 2 %: the median of 60 differences has a
@@ -336,6 +344,24 @@ static void test_errors_of_columns(void **state)
     observation_set_release(&o);
 }
 
+/* Differences across a column that was left out are no error: a parabola states none, however many are left out. */
+static void test_columns_that_were_left_out(void **state)
+{
+    struct observation_set o;
+    (void)state;
+    observation_set_init(&o);
+    for (size_t i = 0, number = 1; i < 60; i++) {
+        const double x = (double)i / 60.0;
+        if (i % 6 == 5) continue;
+        struct observation row = {.column = {.number = number++, .n = 50, .angle_deg = 3.0 * (double)i}};
+        for (size_t c = 0; c < 3; c++) row.mean_rgb[c] = 0.1 + x * x;
+        assert_int_equal(observation_set_append(&o, &row, NULL), STATUS_OK);
+    }
+    column_errors_add(&o, 0);
+    for (size_t i = 0; i < o.n; i++) assert_true(o.item[i].se_rgb[1] < 1e-12 * o.item[i].mean_rgb[1]);
+    observation_set_release(&o);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -347,6 +373,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_rows_of_an_oblique_roll, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(test_refused, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test(test_errors_of_columns),
+        cmocka_unit_test(test_columns_that_were_left_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
