@@ -14,7 +14,10 @@ enum method_ability {
     METHOD_TAKES_NUISANCE = 2,  /* gains and stray light of the photographs, which have priors of their own */
     METHOD_TAKES_TEXTURE = 4,   /* contrasts of the photographs, with a weight above 0 */
     METHOD_TAKES_PRECISION = 8, /* a goal of precision */
-    METHOD_N_ABILITY = 4
+    METHOD_TAKES_STARTS = 16,   /* start values, and several starts */
+    METHOD_TAKES_TIES = 32,     /* parameters tied to others */
+    METHOD_TAKES_DENSITY = 64,  /* a density that is fitted */
+    METHOD_N_ABILITY = 7
 };
 
 struct method_info {
@@ -24,8 +27,9 @@ struct method_info {
     const char *only_model;       /* id of the only model that it fits; NULL: it fits every model */
     uint64_t default_path_budget; /* of one fit; 0: follows from the method's schedule */
     size_t default_max_iteration;
-    size_t
-        max_iteration_of_starts; /* with several starts: the random keys of one start (fit_run.h) suffice for these */
+    /* With several starts: the random keys of one start (fit_run.h) suffice for these. A method without starts has this
+     * limit always. */
+    size_t max_iteration_of_starts;
 };
 
 /* The i-th method, NULL behind the last. The first is the default. */

@@ -21,7 +21,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_HALVING = 9, LEAST_PATHS = 256 };
+enum { LEAST_PATHS = 256 };
 
 struct moments {
     double mean[3], variance; /* variance: sum over channels, each relative to its squared mean */
@@ -153,9 +153,14 @@ static uint64_t least_rendering(const struct observation_set *o)
     return sum;
 }
 
+static size_t n_halving_of(const struct fit_problem *problem)
+{
+    return problem->max_iteration > 0 ? problem->max_iteration : method_mean_variance.default_max_iteration;
+}
+
 static uint64_t least_budget(const struct fit_problem *problem)
 {
-    return (uint64_t)n_rendering(N_HALVING) * least_rendering(problem->observation);
+    return (uint64_t)n_rendering(n_halving_of(problem)) * least_rendering(problem->observation);
 }
 
 static status run_mean_variance(const struct fit_problem *problem, struct fit_result *result, struct error *err)
@@ -167,7 +172,7 @@ static status run_mean_variance(const struct fit_problem *problem, struct fit_re
     status s = descent_run_init(&v->run, problem, &descent_mean_variance, err);
     if (s == STATUS_OK) s = find_parameters(v, err);
     if (s != STATUS_OK) goto out;
-    v->n_halving = problem->max_iteration > 0 ? problem->max_iteration : N_HALVING;
+    v->n_halving = n_halving_of(problem);
     const double budget =
         problem->path_budget > 0 ? (double)problem->path_budget : (double)method_mean_variance.default_path_budget;
     const double each = budget / (n_rendering(v->n_halving) * (double)problem->observation->n);

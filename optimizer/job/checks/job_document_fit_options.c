@@ -205,24 +205,54 @@ static status parse_each(const struct reader *r, const struct json_field *fit, c
     return s;
 }
 
-/* Refuses priors, nuisance terms and a goal of precision that the method does not take. */
-static status check_method(const struct job_fit *fit, struct error *err)
+static bool any_given(const double value[JOB_MAX_PARAM])
 {
-    bool has_prior = fit->profile_job[0] != '\0';
-    for (size_t i = 0; i < fit->n_model; i++)
-        for (size_t p = 0; p < JOB_MAX_PARAM; p++) has_prior = has_prior || !isnan(fit->model[i].option.prior_mean[p]);
+    for (size_t p = 0; p < JOB_MAX_PARAM; p++)
+        if (!isnan(value[p])) return true;
+    return false;
+}
+
+/* Returns whether the document gives start values. The entry of a density is filled in without (job_fit.h). */
+static bool has_start(const struct model_info *m, const struct job_model *given)
+{
+    for (size_t p = 0; p < m->n_param; p++)
+        if (m->param[p].kind != PARAM_DENSITY && !isnan(given->start[p])) return true;
+    return false;
+}
+
+/* Refuses terms, starts and ties that the method does not take. */
+static status check_method(const struct reader *r, struct error *err)
+{
+    const struct job_fit *fit = r->fit;
     const struct job_fit_option *o = &fit->model[0].option;
-    unsigned wanted = (has_prior ? METHOD_TAKES_PRIORS : 0u) |
-                      (o->gain != JOB_GAIN_NONE || o->stray_light ? METHOD_TAKES_NUISANCE : 0u) |
-                      (fit->precision > 0.0 ? METHOD_TAKES_PRECISION : 0u);
-    unsigned missing = wanted & ~method_catalogue_find(fit->method)->takes;
-    if (missing == 0) return STATUS_OK;
-    const char *path = (missing & METHOD_TAKES_PRIORS) != 0
-                           ? fit->profile_job[0] != '\0' ? "fit.profile_job" : "fit.priors"
-                       : (missing & METHOD_TAKES_NUISANCE) != 0 ? "fit.nuisance"
-                                                                : "fit.precision";
-    return error_set_field(err, STATUS_INVALID, path, "'%s' needs the method '%s': '%s' does not know it", path,
-                           method_catalogue_taking(wanted)->id, fit->method);
+    bool prior = false, start = false, tied = false;
+    for (size_t i = 0; i < fit->n_model; i++) {
+        const struct job_fit_option *own = &fit->model[i].option;
+        prior = prior || any_given(own->prior_mean);
+        start = start || has_start(r->model[i], &fit->model[i]);
+        for (size_t p = 0; p < r->model[i]->n_param; p++) tied = tied || own->leader[p] != p;
+    }
+    const struct {
+        bool given;
+        unsigned ability;
+        const char *path;
+    } term[] = {{fit->profile_job[0] != '\0', METHOD_TAKES_PRIORS, "fit.profile_job"},
+                {prior, METHOD_TAKES_PRIORS, "fit.priors"},
+                {o->gain != JOB_GAIN_NONE || o->stray_light, METHOD_TAKES_NUISANCE, "fit.nuisance"},
+                {fit->precision > 0.0, METHOD_TAKES_PRECISION, "fit.precision"},
+                {o->n_start > 1, METHOD_TAKES_STARTS, "fit.starts"},
+                {start, METHOD_TAKES_STARTS, "fit.start"},
+                {tied, METHOD_TAKES_TIES, "fit.tied"},
+                {fit->fit_density, METHOD_TAKES_DENSITY, "fit.fit_density"}};
+    const unsigned takes = method_catalogue_find(fit->method)->takes;
+    unsigned wanted = 0;
+    for (size_t k = 0; k < sizeof term / sizeof *term; k++) wanted |= term[k].given ? term[k].ability : 0u;
+    for (size_t k = 0; k < sizeof term / sizeof *term; k++)
+        if (term[k].given && (takes & term[k].ability) == 0)
+            return error_set_field(err, STATUS_INVALID, term[k].path,
+                                   "'%s' needs the method '%s': '%s' does not know it", term[k].path,
+                                   method_catalogue_taking(wanted)->id, fit->method);
+    return STATUS_OK;
 }
 
 static status check_only_model(const struct job_fit *fit, struct error *err)
@@ -240,11 +270,13 @@ static status check_only_model(const struct job_fit *fit, struct error *err)
 static status share_common(struct job_fit *fit, struct error *err)
 {
     const struct job_fit_option *common = &fit->model[0].option;
-    size_t most = method_catalogue_find(fit->method)->max_iteration_of_starts;
-    if (common->n_start > 1 && fit->max_iteration > most)
+    const struct method_info *method = method_catalogue_find(fit->method);
+    const bool starts = (method->takes & METHOD_TAKES_STARTS) != 0;
+    if ((common->n_start > 1 || !starts) && fit->max_iteration > method->max_iteration_of_starts)
         return error_set_field(err, STATUS_INVALID, "fit.max_iterations",
-                               "'fit.max_iterations' is %zu: with several starts at most %zu are allowed",
-                               fit->max_iteration, most);
+                               "'fit.max_iterations' is %zu: %s '%s' takes at most %zu", fit->max_iteration,
+                               starts ? "with several starts" : "the method", fit->method,
+                               method->max_iteration_of_starts);
     for (size_t i = 1; i < fit->n_model; i++) {
         struct job_fit_option *o = &fit->model[i].option;
         o->n_start = common->n_start;
@@ -265,7 +297,7 @@ status job_parse_fit_options(const struct json_field *f, const struct model_info
     if (s == STATUS_OK) s = parse_each(&r, f, "bounds", parse_bound, err);
     if (s == STATUS_OK) s = parse_each(&r, f, "priors", parse_prior, err);
     if (s == STATUS_OK) s = share_common(fit, err);
-    if (s == STATUS_OK) s = check_method(fit, err);
+    if (s == STATUS_OK) s = check_method(&r, err);
     if (s == STATUS_OK) s = check_only_model(fit, err);
     for (size_t i = 0; i < fit->n_model && s == STATUS_OK; i++) {
         s = job_fit_resolve(model[i]->param, model[i]->n_param, &fit->model[i], resolved, err);

@@ -32,10 +32,10 @@ static json_t *methods_json(void)
     static const struct {
         enum method_ability ability;
         const char *name;
-    } table[METHOD_N_ABILITY] = {{METHOD_TAKES_PRIORS, "priors"},
-                                 {METHOD_TAKES_NUISANCE, "nuisance"},
-                                 {METHOD_TAKES_TEXTURE, "texture"},
-                                 {METHOD_TAKES_PRECISION, "precision"}};
+    } table[METHOD_N_ABILITY] = {{METHOD_TAKES_PRIORS, "priors"},   {METHOD_TAKES_NUISANCE, "nuisance"},
+                                 {METHOD_TAKES_TEXTURE, "texture"}, {METHOD_TAKES_PRECISION, "precision"},
+                                 {METHOD_TAKES_STARTS, "starts"},   {METHOD_TAKES_TIES, "ties"},
+                                 {METHOD_TAKES_DENSITY, "density"}};
     json_t *list = json_array();
     const struct method_info *m;
     for (size_t i = 0; (m = method_catalogue_at(i)) != NULL; i++) {

@@ -3,7 +3,8 @@
  * {"models":[{"id","title","kind":"surface"|"volume",
  *             "parameters":[{"name","symbol","kind","unit","channel":null|0..2,"lower","upper","start","coordinate",
  *                            "meaning"}]}],
- * "methods":[{"id","title","takes":["priors","nuisance","texture","precision"],"default_path_budget":n|null,
+ * "methods":[{"id","title","takes":["priors","nuisance","texture","precision","starts","ties","density"],
+ *              "default_path_budget":n|null,
  *              "default_max_iterations","max_iterations_with_starts"}],
  * "stop_reasons":[{"id","meaning"}]}
  *

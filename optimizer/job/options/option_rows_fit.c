@@ -62,7 +62,9 @@ const struct job_option option_rows_fit[] = {
      .meaning = "`published_sgd.v1` is the published method, for comparison, by default with the published budget: "
                 "six runs of 60 iterations, two replicas, 64 x 64 pixels of 64 samples, 550 times the paths of "
                 "`gauss_newton.v1`. It takes no `priors`, no `nuisance`, no `precision` and no `texture` of a weight "
-                "above 0. `mean_variance.v1` is the published bisection for `microflake.v1` alone."},
+                "above 0. `mean_variance.v1` is the published bisection for `microflake.v1` alone; it takes no starts "
+                "and ties "
+                "either, and fits no density."},
     {.path = "fit.seed",
      .kind = OPTION_LARGE_COUNT,
      INTO(fit, seed),
@@ -75,9 +77,9 @@ const struct job_option option_rows_fit[] = {
      RANGE(1, 10000),
      .left_out = "the method's",
      .allowed = "1..10000; with several `starts` 1..500",
-     .meaning =
-         "Largest number of iterations of each start. `gauss_newton.v1`: 80; `published_sgd.v1`: 60 for each of "
-         "its six runs, of which 11 are needed to see whether it has converged. `mean_variance.v1`: 9 halvings."},
+     .meaning = "Largest number of iterations of each start. `gauss_newton.v1`: 80; `published_sgd.v1`: 60 for each of "
+                "its six runs, of which 11 are needed to see whether it has converged. `mean_variance.v1`: 9 halvings, "
+                "at most 20."},
     {.path = "fit.path_budget",
      .kind = OPTION_LARGE_COUNT,
      .id = OPTION_PATH_BUDGET,

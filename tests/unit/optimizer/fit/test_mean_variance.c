@@ -175,13 +175,33 @@ static void test_document_needs_its_model(void **state)
     snprintf(text, sizeof text, FIT_OF("{\"method\":\"%s\",\"model\":\"%s\"}"), method_mean_variance.id,
              method_mean_variance.only_model);
     job_document_free(job_document_of_text(text));
+    snprintf(text, sizeof text, FIT_OF("{\"method\":\"%s\",\"model\":\"%s\",\"fit_density\":true}"),
+             method_mean_variance.id, method_mean_variance.only_model);
+    job_document_check_error(text, "fit.fit_density", "does not know it");
+}
+
+/* The least budget grows with the halvings that the job asks for: 256 paths for each of 2 (n^2 + 4) renderings. */
+static void test_least_budget(void **state)
+{
+    (void)state;
+    struct setting x;
+    setup(&x, truth, 1.0);
+    for (size_t n = 0; n <= 20; n += 10) {
+        const double halvings = n > 0 ? (double)n : N_HALVING;
+        x.problem.max_iteration = n;
+        assert_true((double)descent_find(method_mean_variance.id)->least_budget(&x.problem) >=
+                    256.0 * N_ROW * 2.0 * (halvings * halvings + 4.0));
+    }
+    observation_set_release(&x.observation);
 }
 
 int main(void)
 {
-    const struct CMUnitTest test[] = {cmocka_unit_test(test_moments_are_met), cmocka_unit_test(test_fixed_width_stays),
+    const struct CMUnitTest test[] = {cmocka_unit_test(test_moments_are_met),
+                                      cmocka_unit_test(test_fixed_width_stays),
                                       cmocka_unit_test(test_weight_zero),
                                       cmocka_unit_test(test_other_models_are_refused),
-                                      cmocka_unit_test(test_document_needs_its_model)};
+                                      cmocka_unit_test(test_document_needs_its_model),
+                                      cmocka_unit_test(test_least_budget)};
     return cmocka_run_group_tests(test, NULL, NULL);
 }
