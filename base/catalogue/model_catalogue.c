@@ -65,6 +65,14 @@ static const char *const with_modes[] = {
 #define MODEL_HAS_MODES(name) surface_##name##_id,
 #include "base/catalogue/models.def"
 };
+#undef MODEL_HAS_MODES
+#define MODEL_HAS_MODES(...)
+
+static const char *const with_flat_section[] = {
+#undef MODEL_HAS_FLAT_SECTION
+#define MODEL_HAS_FLAT_SECTION(name) surface_##name##_id,
+#include "base/catalogue/models.def"
+};
 
 const struct model_info *model_catalogue_at(size_t i)
 {
@@ -99,6 +107,18 @@ bool model_catalogue_has_modes(const char *id)
 {
     for (size_t i = 0; i < sizeof with_modes / sizeof *with_modes; i++)
         if (strcmp(with_modes[i], id) == 0) return true;
+    return false;
+}
+
+const char *model_catalogue_with_flat_section(size_t i)
+{
+    return i < sizeof with_flat_section / sizeof *with_flat_section ? with_flat_section[i] : NULL;
+}
+
+bool model_catalogue_has_flat_section(const char *id)
+{
+    for (size_t i = 0; i < sizeof with_flat_section / sizeof *with_flat_section; i++)
+        if (strcmp(with_flat_section[i], id) == 0) return true;
     return false;
 }
 

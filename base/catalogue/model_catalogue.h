@@ -48,6 +48,9 @@ bool model_catalogue_has_speckle(const char *id);
 /* The same of models that can have the light of one mode alone (renderer/scattering/scattering.h). */
 const char *model_catalogue_with_modes(size_t i);
 bool model_catalogue_has_modes(const char *id);
+/* The same of models whose light changes with the turn of the fiber's section. */
+const char *model_catalogue_with_flat_section(size_t i);
+bool model_catalogue_has_flat_section(const char *id);
 /* The id of the i-th near field that has a far field, NULL behind the last, and the id of a model's far field: the mean
  * over the width of the fiber with the same parameters (model_row.h). NULL: the model has none. */
 const char *model_catalogue_near_field(size_t i);

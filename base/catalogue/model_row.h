@@ -13,6 +13,8 @@
  *   MODEL_HAS_SPECKLE(name)                         surface model `name` has speckle, for pictures.
  *   MODEL_HAS_MODES(name)                           surface model `name` can have the light of one mode alone
  *                                                   (scattering_model.mode), for profiles.
+ *   MODEL_HAS_FLAT_SECTION(name)                    the light of surface model `name` changes with the turn of the
+ *                                                   section (scattering_model.flat_section), which profiles can state.
  *   MODEL_HAS_FAR_FIELD(near, far)                  surface model `far` is the mean of the near field `near` over the
  *                                                   width of the fiber, with the same parameters. A pixel that is
  *                                                   wider than the fiber sees it (Yan et al. 2017, section 5.2).
@@ -78,6 +80,9 @@
 #endif
 #ifndef MODEL_HAS_MODES
 #define MODEL_HAS_MODES(name)
+#endif
+#ifndef MODEL_HAS_FLAT_SECTION
+#define MODEL_HAS_FLAT_SECTION(name)
 #endif
 #ifndef MODEL_HAS_FAR_FIELD
 #define MODEL_HAS_FAR_FIELD(near, far)

@@ -41,7 +41,7 @@ status job_check_correction(const struct option_value *v, struct error *err);
 status job_check_fibers(const struct option_value *v, struct error *err);
 /* the profile of a fiber */
 /* Of a job with a profile: nothing of a cloth is given, and the models are of fibers, and have
- * the mode that the profile shows alone. */
+ * the mode that the profile shows alone; one of them has the turn that is stated. */
 status job_check_profile_document(const struct option_value *v, struct error *err);
 /* Exactly one of a table and a bowl. */
 status job_check_profile(const struct option_value *v, struct error *err);

@@ -47,6 +47,18 @@ static status check_mode(const struct job_sections *section, struct error *err)
     return STATUS_OK;
 }
 
+/* A stated turn of the section counts in at least one model of the job. */
+static status check_turn(const struct job_sections *section, struct error *err)
+{
+    if (isnan(section->profile->turn_deg)) return STATUS_OK;
+    for (size_t i = 0; i < section->fit->n_model; i++)
+        if (model_catalogue_has_flat_section(section->fit->model[i].id)) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, "profile.turn_deg",
+                           "'profile.turn_deg' is %g, but the light of '%s' does not change with the turn of the "
+                           "section: leave it out, or take '%s'",
+                           section->profile->turn_deg, section->fit->model[0].id, model_catalogue_with_flat_section(0));
+}
+
 status job_check_profile_document(const struct option_value *v, struct error *err)
 {
     static const char *const of_document[] = {"sample", "profile", "fit", NULL},
@@ -63,7 +75,8 @@ status job_check_profile_document(const struct option_value *v, struct error *er
             s = error_set_field(err, STATUS_INVALID, "fit.models",
                                 "'%s' is a model of a cloth as a volume: a profile needs a model of fibers",
                                 v->section->fit->model[i].id);
-    return s == STATUS_OK ? check_mode(v->section, err) : s;
+    if (s == STATUS_OK) s = check_mode(v->section, err);
+    return s == STATUS_OK ? check_turn(v->section, err) : s;
 }
 
 status job_check_profile(const struct option_value *v, struct error *err)

@@ -97,14 +97,15 @@ def test_azimuths_of_the_light(real):
     assert "section turned by" in done.stdout, done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("profile,field,says", [
-    ({"turn_deg": 20}, "profile.turn_deg", "'phi_i_deg'"),
-    ({"mode": "TRT"}, "profile.mode", "isotropic.v1"),
+@pytest.mark.parametrize("profile,model,field,says", [
+    ({"turn_deg": 20}, "elliptical_oriented.v1", "profile.turn_deg", "'phi_i_deg'"),
+    ({"turn_deg": 20}, "isotropic.v1", "profile.turn_deg", "does not change with the turn"),
+    ({"mode": "TRT"}, "isotropic.v1", "profile.mode", "isotropic.v1"),
 ])
-def test_turns_and_modes_that_are_refused(tmp_path, profile, field, says):
+def test_turns_and_modes_that_are_refused(tmp_path, profile, model, field, says):
     (tmp_path / "input").mkdir()
     (tmp_path / "input" / "fiber.csv").write_text(table())
-    (tmp_path / "job.json").write_text(json.dumps({**DOCUMENT, "profile": {**DOCUMENT["profile"], **profile}, "fit": {"model": "isotropic.v1"}}))
+    (tmp_path / "job.json").write_text(json.dumps({**DOCUMENT, "profile": {**DOCUMENT["profile"], **profile}, "fit": {"model": model}}))
     done = subprocess.run([program("selvedge-worker"), str(tmp_path)], capture_output=True, text=True, timeout=300)
     error = json.loads((tmp_path / "status.json").read_text())["error"]
     assert done.returncode != 0 and error["field"] == field and says in error["text"], error

@@ -81,6 +81,7 @@ static void registries_follow_the_catalogue(void **unused)
         assert_ptr_equal(s ? (*surface)->param : (*volume)->param, m->param);
         assert_int_equal(s ? (*surface)->n_param : (*volume)->n_param + 1, m->n_param);
         assert_int_equal(model_catalogue_has_modes(m->id), s && (*surface)->mode != NULL);
+        assert_int_equal(model_catalogue_has_flat_section(m->id), s && (*surface)->flat_section);
         if (s)
             surface++;
         else

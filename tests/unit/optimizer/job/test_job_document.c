@@ -312,15 +312,29 @@ static void test_mode_of_profile(void **state)
     job_document_check_error(PROFILE("R", "\"elliptical.v1\""), "profile.mode", "'elliptical_oriented.v1' has");
 }
 
+/* A stated turn of the section counts in one model at least. */
+static void test_turn_of_profile(void **state)
+{
+    static const char *const document =
+        "{\"sample\":\"s\",\"profile\":{\"file\":\"p.csv\",\"turn_deg\":20},\"fit\":{\"models\":[\"fur.v1\"%s]}}";
+    char text[400];
+    (void)state;
+    snprintf(text, sizeof text, document, ",\"textile.v3\"");
+    job_document_free(job_document_of_text(text));
+    snprintf(text, sizeof text, document, "");
+    job_document_check_error(text, "profile.turn_deg", "'fur.v1' does not change");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_defaults),      cmocka_unit_test(test_everything_given),
-        cmocka_unit_test(test_geometry_only), cmocka_unit_test(test_structure),
-        cmocka_unit_test(test_volume),        cmocka_unit_test(test_alignment),
-        cmocka_unit_test(test_photographs),   cmocka_unit_test(test_file_names),
-        cmocka_unit_test(test_damage),        cmocka_unit_test(test_stage_weights),
-        cmocka_unit_test(test_raw_volume),    cmocka_unit_test(test_mode_of_profile),
+        cmocka_unit_test(test_defaults),        cmocka_unit_test(test_everything_given),
+        cmocka_unit_test(test_geometry_only),   cmocka_unit_test(test_structure),
+        cmocka_unit_test(test_volume),          cmocka_unit_test(test_alignment),
+        cmocka_unit_test(test_photographs),     cmocka_unit_test(test_file_names),
+        cmocka_unit_test(test_damage),          cmocka_unit_test(test_stage_weights),
+        cmocka_unit_test(test_raw_volume),      cmocka_unit_test(test_mode_of_profile),
+        cmocka_unit_test(test_turn_of_profile),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
