@@ -28,6 +28,10 @@ function groupsOf(rows, keys, fits) {
   return [...found.values()].filter(fits);
 }
 
+// Largest and smallest number of a list of any length: a call takes some 60,000 arguments at most, a profile has up to 300,000 values.
+export const largest = (list, least = -Infinity) => list.reduce((a, b) => Math.max(a, b), least);
+export const smallest = (list, most = Infinity) => list.reduce((a, b) => Math.min(a, b), most);
+
 const degrees = (name, value) => (Number.isFinite(value) ? `${name} ${short(value)}°` : null);
 const named = (...parts) => parts.filter(Boolean).join(", ");
 
@@ -61,7 +65,7 @@ export function profileViews(rows) {
 
 // Angles around the fiber that span most of a turn make a whole one; others keep their range.
 function axisOf(spec, rows) {
-  const values = rows.map(spec.of), low = Math.min(...values), high = Math.max(...values), whole = spec.title.startsWith("azimuth") && high - low > 270;
+  const values = rows.map(spec.of), low = smallest(values), high = largest(values), whole = spec.title.startsWith("azimuth") && high - low > 270;
   return { ...spec, whole, low: whole ? 0 : low, high: whole ? TURN : high, at: (r) => (whole ? around(spec.of(r)) : spec.of(r)) };
 }
 
@@ -123,7 +127,7 @@ function legend(top) {
 // Radiance as the distance from the middle, by the azimuth of the view; the light comes from the right.
 function polarOf(view, group, model, name) {
   const size = 360, half = size / 2, radius = half - 34, rows = [...group.rows].sort((a, b) => a.phi - b.phi);
-  const values = rows.flatMap((r) => [r.measured, r.fitted[model]]).filter(Number.isFinite), top = Math.max(...values, 1e-12);
+  const values = rows.flatMap((r) => [r.measured, r.fitted[model]]).filter(Number.isFinite), top = largest(values, 1e-12);
   const at = (phi, v) => { const d = radius * Math.max(v, 0) / top, a = phi * Math.PI / 180; return [half + d * Math.cos(a), half - d * Math.sin(a)]; };
   const root = svg("svg", { viewBox: `0 0 ${size} ${size}`, class: "plot polar", role: "img", "aria-label": `measured and fitted radiance around the fiber, ${view.name(group)}` });
   for (const k of [0.5, 1]) root.append(svg("circle", { cx: half, cy: half, r: radius * k, class: "axis ring" }), svg("text", { x: half + 0.72 * radius * k, y: half - 0.72 * radius * k }, short(top * k)));
@@ -150,7 +154,7 @@ export function profileMaps(view, models) {
   const draw = () => {
     const m = Number(model.value), g = view.groups[Number(group.value)];
     if (view.kind === "polar") { box.replaceChildren(...spread(view.groups, 6).map((one) => polarOf(view, one, m, models[m]))); return; }
-    const top = Math.max(1e-12, ...g.rows.flatMap((r) => [r.measured, r.fitted[m]]).filter(Number.isFinite));
+    const top = largest(g.rows.flatMap((r) => [r.measured, r.fitted[m]]).filter(Number.isFinite), 1e-12);
     box.replaceChildren(mapOf(view, g, (r) => r.measured, top, "measured"), mapOf(view, g, (r) => r.fitted[m], top, `fitted, ${models[m]}`));
     scale.replaceChildren(legend(top), el("span", { class: "hint" }, "Radiance. The colours follow its root."));
   };

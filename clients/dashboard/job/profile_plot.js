@@ -2,7 +2,7 @@
 // dots, the fitted models as lines, a plot for each pair of angles along the fiber.
 import { el, svg } from "../page_parts.js";
 import { raw } from "../server_link.js";
-import { profileMaps, profileViews } from "./profile_maps.js";
+import { largest, profileMaps, profileViews, smallest } from "./profile_maps.js";
 
 const MOST_PLOT = 6, LEAST_ROW = 4, W = 380, H = 210, L = 46, R = 10, T = 10, B = 36;
 const COLOURS = ["var(--accent)", "var(--green)", "var(--warn)", "var(--red)"];
@@ -29,8 +29,8 @@ function slicesOf(rows) {
 }
 
 function plot(slice, models) {
-  const { rows } = slice, top = 1.08 * Math.max(1e-12, ...rows.flatMap((r) => [r.measured, ...r.fitted]).filter(Number.isFinite));
-  const from = rows[0].phi, to = rows[rows.length - 1].phi, low = Math.min(0, ...rows.map((r) => r.measured));
+  const { rows } = slice, top = 1.08 * largest(rows.flatMap((r) => [r.measured, ...r.fitted]).filter(Number.isFinite), 1e-12);
+  const from = rows[0].phi, to = rows[rows.length - 1].phi, low = smallest(rows.map((r) => r.measured), 0);
   const x = (phi) => L + (W - L - R) * (phi - from) / Math.max(to - from, 1e-9), y = (v) => H - B - (H - T - B) * (v - low) / (top - low);
   const name = `light ${slice.thetaI}°, view ${slice.thetaO}° from the fiber's normal plane${Number.isNaN(slice.phiI) ? "" : `, light at azimuth ${slice.phiI}°`}${slice.channel ? `, ${slice.channel}` : ""}`;
   const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "plot", role: "img", "aria-label": `measured and fitted radiance, ${name}` });
