@@ -49,12 +49,26 @@ static void film_at(const struct wrap *f, double s, double p[3], double normal[3
     for (int x = 0; x < 3; x++) normal[x] = beyond[x] - middle[x];
 }
 
+/* Number of segments of a film of the length length_m on a yarn of the length nominal_m, at the description's own
+ * values. A segment has one section: the next one's is turned against it by the torsion, so its edge is a step higher,
+ * of at most half of the thickness. Across larger steps rays would slip through the film. */
+static size_t n_segment_of(const struct wrap *f, const double half_m[2], double length_m, double nominal_m)
+{
+    const double turn_rad = 2.0 * M_PI * fabs(f->turns) * nominal_m / length_m;
+    double n = fmax(nominal_m / (STEP_RADII * sqrt(half_m[0] * half_m[1])), (double)f->path->n);
+    n = fmax(n, NODES_PER_TURN * fabs(f->turns));
+    return (size_t)ceil(fmax(n, turn_rad * half_m[0] / half_m[1]));
+}
+
 status cloth_film_wrap(struct cloth_work *w, size_t kind, const struct yarn *path, double nominal_m, struct error *err)
 {
     const struct cloth_film *film = &w->d->kind[kind].film;
     const struct kind_shape *k = &w->kind[kind];
     const double half_m[2] = {0.5 * um * film->width_um, 0.5 * um * film->thickness_um};
     struct wrap f = {.path = path, .turns = round(film->wraps_per_m * nominal_m)};
+    const double *core_m = w->nominal[kind].core_half_m; /* 0 of a film without a core */
+    const double around_m = 2.0 * M_PI * f.turns * sqrt(0.5 * (core_m[0] * core_m[0] + core_m[1] * core_m[1]));
+    const double length_m = hypot(nominal_m, around_m);
     if (k->n_fiber > 0) {
         const struct rng_key key = {.seed = w->d->seed, .iteration = STREAM_FILM};
         struct rng rng;
@@ -62,10 +76,7 @@ status cloth_film_wrap(struct cloth_work *w, size_t kind, const struct yarn *pat
         f.phase_rad = 2.0 * M_PI * rng_double(&rng);
         for (int a = 0; a < 2; a++) f.reach_m[a] = k->core_half_m[a] + half_m[1];
     }
-    const double by_length = nominal_m / (STEP_RADII * sqrt(half_m[0] * half_m[1]));
-    const size_t n = (size_t)ceil(fmax(fmax(by_length, (double)path->n), NODES_PER_TURN * fabs(f.turns)));
-    const double *core_m = w->nominal[kind].core_half_m, /* of a film without a core its own half width, which turns */
-        around_m = 2.0 * M_PI * f.turns * sqrt(0.5 * (core_m[0] * core_m[0] + core_m[1] * core_m[1]));
+    const size_t n = n_segment_of(&f, half_m, length_m, nominal_m);
     status s = reserve(w, n + 1, err);
     for (size_t i = 0; i <= n && s == STATUS_OK; i++) {
         struct film_node *node = &w->film.node[w->film.n++];
@@ -80,7 +91,7 @@ status cloth_film_wrap(struct cloth_work *w, size_t kind, const struct yarn *pat
                 (float)((after[(a + 1) % 3] * normal[(a + 2) % 3] - after[(a + 2) % 3] * normal[(a + 1) % 3]) /
                         (um * um));
         for (int a = 0; a < 2; a++) node->half_m[a] = (float)half_m[a];
-        node->step_m = (float)(hypot(nominal_m, around_m) / (double)n);
+        node->step_m = (float)(length_m / (double)n);
         node->group = (uint8_t)cloth_film_group(w->d, kind);
         node->is_first = i == 0;
         node->axis_class = path->axis_class;
