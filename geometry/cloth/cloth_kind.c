@@ -39,11 +39,13 @@ static void flatten(struct kind_shape *s)
 static void add_film(const struct cloth_film *film, struct kind_shape *s)
 {
     for (int a = 0; a < 2; a++) s->core_half_m[a] = s->half_m[a];
+    s->outer_m = s->round_m;
     if (!(film->width_um > 0.0)) return;
     if (s->n_fiber > 0) {
         for (int a = 0; a < 2; a++) s->half_m[a] += 1e-6 * film->thickness_um;
+        s->outer_m += 1e-6 * film->thickness_um;
     } else {
-        s->half_m[0] = 0.5e-6 * film->width_um;
+        s->outer_m = s->half_m[0] = 0.5e-6 * film->width_um;
         s->half_m[1] = film->wraps_per_m != 0.0 ? s->half_m[0] : 0.5e-6 * film->thickness_um;
     }
 }

@@ -24,7 +24,7 @@ static double unit_m(const struct cloth_work *w, const struct kind_shape *kind, 
 {
     size_t n = w->d->n_yarn[CLOTH_WEFT];
     double sum = 0.0;
-    for (size_t i = 0; i < n; i++) sum += kind[kind_of(w->d, i)].round_m;
+    for (size_t i = 0; i < n; i++) sum += kind[kind_of(w->d, i)].outer_m;
     return sum / (double)n / (YARN * cloth_number_value(w->d, number, -1, "cover"));
 }
 

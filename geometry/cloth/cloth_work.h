@@ -15,6 +15,7 @@ struct kind_shape {
         fiber_angle_rad;
     double hairs_per_m, hair_length_m, melange;
     double round_m;        /* radius of the yarn's round section */
+    double outer_m;        /* the same with the film around the yarn; half the width of a film alone */
     double half_m[2];      /* of the flattened section: width, height */
     double ply_radius_m;   /* of the section of a ply; round_m of a single yarn */
     double ply_distance_m; /* between the centres of ply and yarn; 0 of a single yarn */

@@ -270,6 +270,29 @@ static void test_sequins(void **state)
     free(d);
 }
 
+/* Loops of a knit are as wide as those of a yarn of the film's width. */
+static void test_knitted_film(void **state)
+{
+    (void)state;
+    struct cloth_description *d = malloc(sizeof *d);
+    struct fiber_set yarn, film;
+    assert_non_null(d);
+    assert_int_equal(cloth_description_init(d, "jersey", NULL), STATUS_OK);
+    d->n_kind = 1;
+    d->kind[0].n_fiber = 16;
+    d->n_yarn[CLOTH_WEFT] = d->n_yarn[CLOTH_WARP] = 2;
+    cloth_description_number(d);
+    build(d, &yarn);
+    const double width_um = 2e6 * 8 * um * sqrt(16 / 0.6); /* of the yarn, at its radius and packing */
+    d->kind[0].n_fiber = 0;
+    d->kind[0].film = (struct cloth_film){.width_um = width_um, .thickness_um = 10};
+    build(d, &film);
+    for (int a = 0; a < 2; a++) assert_true(fabs(film.tile_size_m[a] / yarn.tile_size_m[a] - 1) < 1e-6);
+    fiber_set_release(&yarn);
+    fiber_set_release(&film);
+    free(d);
+}
+
 static void refuse(struct cloth_description *d, const char *field)
 {
     struct error err = {0};
@@ -303,6 +326,6 @@ int main(void)
 {
     const struct CMUnitTest test[] = {cmocka_unit_test(test_film_around_a_yarn), cmocka_unit_test(test_film_alone),
                                       cmocka_unit_test(test_fibers_leave_films), cmocka_unit_test(test_sequins),
-                                      cmocka_unit_test(test_refused)};
+                                      cmocka_unit_test(test_knitted_film),       cmocka_unit_test(test_refused)};
     return cmocka_run_group_tests(test, NULL, NULL);
 }
