@@ -33,6 +33,7 @@ struct job_column {
     double angle_deg;       /* around the cylinder, from the highest line towards +x */
     double corner_px[4][2]; /* upper left, upper right, lower right, lower left of its picture, with the axis upwards */
     double angle_se_deg;    /* by the errors of the silhouettes */
+    size_t view_px[4];      /* part of the photograph that holds all of its columns */
 };
 
 struct job_photograph {

@@ -244,6 +244,17 @@ static bool make_column(const struct wrapped *w, const double a[2], struct job_p
     return true;
 }
 
+/* The part of the photograph that holds all columns. */
+static void part_of_columns(const struct job_photograph *column, size_t n, size_t part[4])
+{
+    memcpy(part, column[0].crop_px, sizeof column[0].crop_px);
+    for (size_t i = 1; i < n; i++)
+        for (size_t a = 0; a < 2; a++) {
+            part[a] = column[i].crop_px[a] < part[a] ? column[i].crop_px[a] : part[a];
+            part[2 + a] = column[i].crop_px[2 + a] > part[2 + a] ? column[i].crop_px[2 + a] : part[2 + a];
+        }
+}
+
 static void report_left_out(const struct wrapped *w, size_t n, const struct left_out *out)
 {
     const struct job_photograph *p = w->photograph;
@@ -275,7 +286,10 @@ static status append_columns(const struct wrapped *w, struct column_list *list, 
             out.narrow++;
     }
     if (s != STATUS_OK) return s;
-    for (size_t i = first; i < list->n; i++) list->item[i].column.n = list->n - first;
+    for (size_t i = first; i < list->n; i++) {
+        list->item[i].column.n = list->n - first;
+        part_of_columns(list->item + first, list->n - first, list->item[i].column.view_px);
+    }
     report_left_out(w, list->n - first, &out);
     if (list->n > first) return STATUS_OK;
     return error_set(err, STATUS_INVALID,

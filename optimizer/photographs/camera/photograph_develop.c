@@ -34,9 +34,19 @@ static void apply_color(const struct photograph_process *k, struct image *im, st
     for (size_t c = 0; c < 3; c++) r->noise_se_rgb[c] = sqrt(out[c]);
 }
 
+/* Gives the column that was cut its part of the errors of the times, which belong to the mean of all columns. */
+static void share_time_error(struct merged_view *e)
+{
+    const struct image *im = &e->image[0];
+    double mean[3] = {0};
+    for (size_t i = 0; i < 3 * im->width * im->height; i++)
+        mean[i % 3] += (double)im->pixel[i] / (double)(im->width * im->height);
+    for (size_t i = 0; i < 3 * e->n; i++)
+        e->time_error[i / 3][i % 3] *= e->light_mean[i % 3] > 0.0 ? mean[i % 3] / e->light_mean[i % 3] : 0.0;
+}
+
 /* Adds the error of the mean radiance by the errors of the fitted times. */
-static void add_time_error(const struct photograph_process *k, const struct view_exposures *e,
-                           struct photograph_record *r)
+static void add_time_error(const struct photograph_process *k, const struct merged_view *e, struct photograph_record *r)
 {
     for (size_t i = 0; i < e->n; i++) {
         double error[3] = {e->time_error[i][0], e->time_error[i][1], e->time_error[i][2]};
@@ -54,7 +64,7 @@ static double distance_factor(const struct photograph_process *k, const struct j
 
 /* Share of the crop's pixels, in the picture before the correction of the lens, that are saturated in all exposures.
  * Those have at least the value of full scale in the shortest one. */
-static double saturated_in_crop(const struct view_exposures *e, const size_t crop[4])
+static double saturated_in_crop(const struct merged_view *e, const size_t crop[4])
 {
     const struct image *im = &e->image[0];
     const struct photograph_info *info = &e->record[0].info;
@@ -72,7 +82,7 @@ static double saturated_in_crop(const struct view_exposures *e, const size_t cro
     return (double)n / (double)((x1 - crop[0]) * (y1 - crop[1]));
 }
 
-static status correct_lens(const struct photograph_process *k, const struct job_photograph *p, struct view_exposures *e,
+static status correct_lens(const struct photograph_process *k, const struct job_photograph *p, struct merged_view *e,
                            struct error *err)
 {
     double crop[4];
@@ -84,11 +94,14 @@ static status correct_lens(const struct photograph_process *k, const struct job_
 }
 
 /* Replaces the crop, and the variances of its pixels, by the column of a cylinder that it holds. */
-static status cut_column(const struct job_photograph *p, struct view_exposures *e, struct error *err)
+static status cut_column(const struct photograph_process *k, const struct job_photograph *p, struct merged_view *e,
+                         struct error *err)
 {
+    static const size_t whole[4] = {0};
     const double(*corner)[2] = (const double(*)[2])p->column.corner_px;
     if (p->column.number == 0) return STATUS_OK;
     e->record[0].is_column = true;
+    if (!photograph_process_has_lens(k)) e->record[0].saturated_share = saturated_in_crop(e, whole);
     status s = column_picture_cut(corner, p->crop_px, &e->image[0], err);
     return s == STATUS_OK && e->variance.pixel != NULL ? column_picture_cut(corner, p->crop_px, &e->variance, err) : s;
 }
@@ -96,16 +109,17 @@ static status cut_column(const struct job_photograph *p, struct view_exposures *
 status photograph_develop(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
                           struct image *im, struct photograph_record *record, struct error *err)
 {
-    struct view_exposures *e = calloc(1, sizeof *e);
+    struct merged_view *e = calloc(1, sizeof *e);
     if (e == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read photograph '%s': out of memory", p->file);
     memset(im, 0, sizeof *im);
     status s = view_exposures_read(k, folder, p, e, err);
     if (s == STATUS_OK && photograph_process_has_lens(k)) s = correct_lens(k, p, e, err);
-    if (s == STATUS_OK) s = cut_column(p, e, err);
+    if (s == STATUS_OK) s = cut_column(k, p, e, err);
     if (s == STATUS_OK) {
         struct photograph_record *r = &e->record[0];
         const double factor = p->scale / r->exposure * distance_factor(k, p);
         mean_error(&e->variance, r->noise_se_rgb);
+        if (r->is_column) share_time_error(e);
         if (k->has_color) apply_color(k, &e->image[0], r);
         add_time_error(k, e, r);
         image_scale(&e->image[0], factor);
@@ -118,7 +132,7 @@ status photograph_develop(const struct photograph_process *k, const char *folder
         e->image[0] = (struct image){0};
         if (record != NULL) *record = *r;
     }
-    view_exposures_release(e);
+    merged_view_release(e);
     free(e);
     return s;
 }

@@ -4,6 +4,7 @@
 #include "base/option_id.h"
 #include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/document/job_setup.h"
+#include "optimizer/photographs/camera/column_views.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -22,6 +23,8 @@ void photograph_process_release(struct photograph_process *k)
     image_release(&k->chart_picture);
     if (k->carry != NULL) exposure_carry_release(k->carry);
     free(k->carry);
+    if (k->columns != NULL) column_views_release(k->columns);
+    free(k->columns);
     photograph_process_init(k);
 }
 

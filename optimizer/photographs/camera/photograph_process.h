@@ -14,6 +14,7 @@
 
 #include <jansson.h>
 
+struct column_views;
 struct job_photograph;
 struct job_rows;
 struct job_setup;
@@ -46,6 +47,7 @@ struct photograph_process {
      * carry: owned. */
     const struct job_rows *rows;
     struct exposure_carry *carry;
+    struct column_views *columns; /* the photograph of a cylinder that was read last; owned; NULL: none is kept */
     /* The list that the ledger of every file that is read is appended to (base/files/file_ledger_json.h), of the
      * caller; NULL: not wanted. */
     json_t *files;

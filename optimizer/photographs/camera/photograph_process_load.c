@@ -5,6 +5,7 @@
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/document/job_setup.h"
+#include "optimizer/photographs/camera/column_views.h"
 #include "optimizer/photographs/camera/cylinder_columns.h"
 #include "optimizer/photographs/camera/marker_views.h"
 #include "optimizer/photographs/camera/photograph_develop.h"
@@ -111,6 +112,7 @@ status photograph_process_load(struct photograph_process *k, struct job_setup *s
     }
     k->rows = rows;
     if (s == STATUS_OK && k->carry == NULL) k->carry = calloc(1, sizeof *k->carry);
+    if (s == STATUS_OK && k->columns == NULL) k->columns = calloc(1, sizeof *k->columns);
     k->lamp_distance_cm = setup->lamp_directional ? NAN : setup->lamp_distance_cm;
     if (s == STATUS_OK && setup->noise_file[0] != '\0') {
         snprintf(path, sizeof path, "%s/%s", folder, setup->noise_file);

@@ -3,6 +3,7 @@
 #include "base/files/file_ledger_json.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_rows.h"
+#include "optimizer/photographs/camera/column_views.h"
 #include "optimizer/photographs/camera/exposure_ratio.h"
 
 #include <math.h>
@@ -13,7 +14,7 @@
 enum { PATH_BYTES = 4096 };
 
 static status read_exposure(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
-                            size_t i, struct view_exposures *e, struct error *err)
+                            size_t i, struct merged_view *e, struct error *err)
 {
     struct job_photograph own = *p;
     char path[PATH_BYTES];
@@ -30,7 +31,7 @@ static status read_exposure(const struct photograph_process *k, const char *fold
 
 static bool differ(double a, double b) { return !(a == b || (isnan(a) && isnan(b))); }
 
-static status check_exposures(const struct view_exposures *e, struct error *err)
+static status check_exposures(const struct merged_view *e, struct error *err)
 {
     for (size_t i = 0; i < e->n; i++) {
         const struct photograph_record *a = &e->record[0], *b = &e->record[i];
@@ -51,7 +52,7 @@ static status check_exposures(const struct view_exposures *e, struct error *err)
     return STATUS_OK;
 }
 
-static status check_noise(const struct photograph_process *k, const struct view_exposures *e, struct error *err)
+static status check_noise(const struct photograph_process *k, const struct merged_view *e, struct error *err)
 {
     const struct photograph_info *info = &e->record[0].info;
     if (!k->has_noise) return STATUS_OK;
@@ -87,7 +88,7 @@ static void time_error(const struct exposure_ratio *ratio, size_t n, const struc
 }
 
 /* Enters the fitted time beside the stated one. */
-static void enter_time(struct view_exposures *e, size_t i, const struct exposure_ratio *ratio)
+static void enter_time(struct merged_view *e, size_t i, const struct exposure_ratio *ratio)
 {
     char reason[FILE_STATEMENT_BYTES] = "";
     struct file_ledger *ledger = &e->record[i].info.ledger;
@@ -104,8 +105,7 @@ static void enter_time(struct view_exposures *e, size_t i, const struct exposure
 }
 
 /* Ranks exposures by the rounding of their times against the time of the chart. */
-static void rank_exposures(const struct photograph_process *k, const struct view_exposures *e,
-                           double rank[EXPOSURE_MAX])
+static void rank_exposures(const struct photograph_process *k, const struct merged_view *e, double rank[EXPOSURE_MAX])
 {
     const double of_color = exposure_time_rounding(k->color_exposure.time_s);
     for (size_t i = 0; i < e->n; i++) {
@@ -135,7 +135,7 @@ struct scaled_view {
     struct exposure_set set; /* of the members above */
 };
 
-static void scale_view(const struct photograph_process *k, struct view_exposures *e, struct scaled_view *v)
+static void scale_view(const struct photograph_process *k, struct merged_view *e, struct scaled_view *v)
 {
     v->noise = k->noise;
     for (size_t c = 0; c < 3 && k->n_dark > 0; c++) /* dark frames hold the mean of both noises */
@@ -159,7 +159,7 @@ static void scale_view(const struct photograph_process *k, struct view_exposures
 
 /* Reads and checks all exposures of p. */
 static status read_view(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
-                        struct view_exposures *e, struct error *err)
+                        struct merged_view *e, struct error *err)
 {
     status s = STATUS_OK;
     for (size_t i = 0; i <= p->n_exposure && s == STATUS_OK; i++) s = read_exposure(k, folder, p, i, e, err);
@@ -173,7 +173,7 @@ static status search_view(const struct photograph_process *k, const char *folder
                           struct error *err)
 {
     struct exposure_pair pair[EXPOSURE_MAX];
-    struct view_exposures *e = calloc(1, sizeof *e);
+    struct merged_view *e = calloc(1, sizeof *e);
     struct scaled_view *v = calloc(1, sizeof *v);
     status s = e != NULL && v != NULL ? STATUS_OK
                                       : error_set(err, STATUS_NO_MEMORY, "cannot compare exposures: out of memory");
@@ -182,14 +182,14 @@ static status search_view(const struct photograph_process *k, const char *folder
         if (exposure_pairs_compare(&v->set, pair, NULL) == STATUS_OK)
             s = exposure_carry_add(k->carry, &v->set, &e->record[0].info, pair, err);
     }
-    if (e != NULL) view_exposures_release(e);
+    if (e != NULL) merged_view_release(e);
     free(e);
     free(v);
     return s;
 }
 
 /* Gives exposures that cannot be compared in this view the ratios of others. All views are read for this, once. */
-static status take_carried(const struct photograph_process *k, const char *folder, const struct view_exposures *e,
+static status take_carried(const struct photograph_process *k, const char *folder, const struct merged_view *e,
                            const struct exposure_set *set, struct exposure_pair *pair, struct error *err)
 {
     bool wanted = false;
@@ -205,7 +205,7 @@ static status take_carried(const struct photograph_process *k, const char *folde
 }
 
 /* Fits the times of the exposures. */
-static status fit_times(const struct photograph_process *k, const char *folder, struct view_exposures *e,
+static status fit_times(const struct photograph_process *k, const char *folder, struct merged_view *e,
                         const struct exposure_set *set, struct exposure_ratio *ratio, struct error *err)
 {
     double rank[EXPOSURE_MAX];
@@ -220,7 +220,7 @@ static status fit_times(const struct photograph_process *k, const char *folder, 
 
 /* Merges into image[0], which keeps the unit of the first exposure. */
 static status merge(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
-                    struct view_exposures *e, struct error *err)
+                    struct merged_view *e, struct error *err)
 {
     struct photograph_record *r = &e->record[0];
     struct scaled_view v = {.level = 1.0};
@@ -243,13 +243,14 @@ static status merge(const struct photograph_process *k, const char *folder, cons
     time_error(&ratio, e->n, &light, e->time_error);
     for (size_t i = 0; i < 3 * e->n; i++) e->time_error[i / 3][i % 3] *= v.stated_s[0];
     for (size_t i = 0; i < 3 * e->n; i++) e->time_error[i / 3][i % 3] *= v.level;
+    for (size_t i = 0; i < 3 * e->n; i++) e->light_mean[i % 3] += light.light[i / 3][i % 3] * v.level * v.stated_s[0];
     image_scale(first, v.level * v.stated_s[0]); /* the first one's time is divided by later */
     if (k->has_noise) image_scale(&e->variance, v.level * v.level * v.stated_s[0] * v.stated_s[0]);
     return STATUS_OK;
 }
 
-status view_exposures_read(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
-                           struct view_exposures *e, struct error *err)
+static status read_and_merge(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
+                             struct merged_view *e, struct error *err)
 {
     status s = read_view(k, folder, p, e, err);
     if (s == STATUS_OK && (p->n_exposure > 0 || k->has_noise)) s = merge(k, folder, p, e, err);
@@ -257,8 +258,16 @@ status view_exposures_read(const struct photograph_process *k, const char *folde
     return s;
 }
 
-void view_exposures_release(struct view_exposures *e)
+status view_exposures_read(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
+                           struct merged_view *e, struct error *err)
 {
-    for (size_t i = 0; i < e->n; i++) image_release(&e->image[i]);
-    image_release(&e->variance);
+    if (p->column.number == 0 || k->columns == NULL) return read_and_merge(k, folder, p, e, err);
+    if (!column_views_has(k->columns, p)) {
+        struct job_photograph all = *p;
+        memcpy(all.crop_px, p->column.view_px, sizeof all.crop_px);
+        status s = read_and_merge(k, folder, &all, e, err);
+        if (s != STATUS_OK) return s;
+        column_views_keep(k->columns, p, e);
+    }
+    return column_views_copy(k->columns, p, !photograph_process_has_lens(k), e, err);
 }

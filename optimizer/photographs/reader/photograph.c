@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { LIMIT_PIXEL = 200 * 1000 * 1000, MAX_BLOCK = 8, MIN_BLOCK_PX = 4, FEW_PX = 16 };
+enum { LIMIT_PIXEL = 200 * 1000 * 1000, MAX_BLOCK = PHOTOGRAPH_PARTS, MIN_BLOCK_PX = 4, FEW_PX = 16 };
 
 static const double saturated_limit = 0.02;
 static const double resampled_limit = 0.2; /* of neighbour_power */
@@ -153,10 +153,10 @@ static double column_weight(const struct image *im, size_t x)
     return 1.0 - fabs(2.0 * ((double)x + 0.5) / (double)im->width - 1.0);
 }
 
-/* Mean over all pixels, weighted across a column, and the scatter of the means of n_block[0] x n_block[1] sub-blocks.
- */
-static void measure_channel(const struct image *im, size_t c, const size_t n_block[2], bool is_column, double *mean,
-                            double *block_sd)
+/* Mean over all pixels, weighted across a column, and the scatter of the means of n_block[0] x n_block[1] sub-blocks,
+ * which are kept for a column. */
+static void measure_channel(const struct image *im, size_t c, const size_t n_block[2], struct photograph_record *r,
+                            double *mean, double *block_sd)
 {
     double total = 0.0, weights = 0.0, sum = 0.0, sum2 = 0.0;
     for (size_t i = 0; i < n_block[0] * n_block[1]; i++) {
@@ -166,13 +166,14 @@ static void measure_channel(const struct image *im, size_t c, const size_t n_blo
         double block = 0.0, own = 0.0;
         for (size_t y = y0; y < y1; y++)
             for (size_t x = x0; x < x1; x++) {
-                const double weight = is_column ? column_weight(im, x) : 1.0;
+                const double weight = r->is_column ? column_weight(im, x) : 1.0;
                 block += weight * (double)im->pixel[(y * im->width + x) * im->n_channel + c];
                 own += weight;
             }
         total += block;
         weights += own;
         block /= own;
+        if (r->is_column) r->part_rgb[i][c] = block;
         sum += block;
         sum2 += block * block;
     }
@@ -229,7 +230,7 @@ double photograph_color_se(const struct photograph_record *r, size_t c)
 status photograph_measure_image(const struct image *im, const char *name, enum job_transfer transfer,
                                 struct photograph_mean *mean, struct error *err)
 {
-    const struct photograph_record *r = &mean->record;
+    struct photograph_record *r = &mean->record;
     if (!r->info.encoded && transfer == JOB_TRANSFER_SRGB)
         return error_set(err, STATUS_INVALID,
                          "cannot use photograph '%s': its transfer is declared as srgb, but %s%s is linear: leave "
@@ -243,9 +244,10 @@ status photograph_measure_image(const struct image *im, const char *name, enum j
                                                      : side / MIN_BLOCK_PX,
                  n_block[2] = {r->is_column ? 1 : n, n};
     const double n_part = sqrt((double)(n_block[0] * n_block[1]));
+    r->n_part = r->is_column ? n : 0;
     for (size_t c = 0; c < 3; c++) {
         double block_sd;
-        measure_channel(im, c, n_block, r->is_column, &mean->mean_rgb[c], &block_sd);
+        measure_channel(im, c, n_block, r, &mean->mean_rgb[c], &block_sd);
         mean->se_rgb[c] = hypot(hypot(block_sd / n_part, r->exposure_se_rgb[c]), photograph_color_se(r, c));
         if (mean->mean_rgb[c] > 0.0) mean->block_contrast = fmax(mean->block_contrast, block_sd / mean->mean_rgb[c]);
     }

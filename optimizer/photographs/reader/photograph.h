@@ -24,7 +24,8 @@ enum {
     PHOTOGRAPH_APERTURE_CAUSE,
     PHOTOGRAPH_ISO_CAUSE,
     PHOTOGRAPH_CAUSES,
-    PHOTOGRAPH_EXPOSURES = JOB_MAX_MORE_EXPOSURES + 1
+    PHOTOGRAPH_EXPOSURES = JOB_MAX_MORE_EXPOSURES + 1,
+    PHOTOGRAPH_PARTS = 8 /* along an edge of the crop */
 };
 
 /* The record of a file on its way to radiances. */
@@ -45,6 +46,8 @@ struct photograph_record {
     double color_error[3][PHOTOGRAPH_CAUSES];
     bool is_column; /* of a cylinder: light changes across it, so parts are compared along it alone, and the weights of
                        pixels fall from the middle to both sides */
+    size_t n_part;  /* of a column: parts along it, and their means */
+    double part_rgb[PHOTOGRAPH_PARTS][3];
     bool resampled; /* pixels depend on their neighbours as after an enlargement or a strong filter */
 };
 

@@ -5,6 +5,7 @@
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/document/job_setup.h"
+#include "optimizer/photographs/camera/column_views.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/photographs/reader/photograph_contrast.h"
 #include "optimizer/photographs/rows/brdf_file.h"
@@ -190,7 +191,8 @@ status observation_set_load(const struct job_setup *setup, const struct job_rows
         status s = load_photograph(&all, &rows->photograph[i], o, err);
         if (s != STATUS_OK) return s;
     }
-    column_errors_add(o, first);
+    if (process->columns != NULL) column_views_release(process->columns); /* a fit follows, which wants the memory */
+    column_errors_state(o, first);
     warn_less_trustworthy(o, first, warn);
     return check_exposures(o, first, process, err);
 }

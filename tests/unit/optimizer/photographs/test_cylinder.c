@@ -9,7 +9,6 @@
 #include "optimizer/photographs/camera/photograph_process_load.h"
 #include "optimizer/photographs/cylinder/cylinder_edges.h"
 #include "optimizer/photographs/cylinder/cylinder_view.h"
-#include "optimizer/photographs/rows/column_errors.h"
 #include "optimizer/photographs/rows/observation_load.h"
 #include "tests/support/drawn_cylinder.h"
 #include "tests/support/scratch_folder.h"
@@ -274,6 +273,56 @@ static void test_rows_of_an_oblique_roll(void **state)
     observation_set_release(&o);
 }
 
+static void check_same_picture(const struct image *a, const struct image *b)
+{
+    assert_true(a->width == b->width && a->height == b->height);
+    for (size_t i = 0; i < 3 * a->width * a->height; i++) assert_true(fabsf(a->pixel[i] - b->pixel[i]) < 1e-6f);
+}
+
+/* The second column does not read the file again, and is the picture that it would have read; with a lens and without
+ * one, which read the whole picture and the crop. */
+static void test_columns_read_once(void **state)
+{
+    struct drawn_cylinder d = {.radius = 15, .px_per_mm = 8, .width = 300, .height = 80, .background = 0.9};
+    drawn_cylinder_place(40, 30, 610, d.light);
+    drawn_cylinder_place(0, 270, 1000, d.eye);
+    static const char *const rig[2] = {"", ",\"rig\":{\"file\":\"rig.json\"}"};
+    static const char lens[] = "{\"selvedge_rig\":1,\"lens\":{\"distortion\":{\"focal_px\":[8000,8000],\"center_px\":"
+                               "[150,40],\"k\":[0.1,0,0],\"p\":[0,0]}}}";
+    scratch_write(scratch_path(state, "rig.json"), lens, sizeof lens - 1);
+    for (size_t i = 0; i < 2; i++) {
+        struct photograph_process k;
+        struct image first, second, again;
+        char text[1000];
+        write_photograph(state, &d);
+        snprintf(text, sizeof text,
+                 "{\"sample\":\"s\"," VOLUME "%s,\"photographs\":[{\"file\":\"roll.exr\",\"set\":\"fit\","
+                 "\"light_theta_deg\":40,\"light_phi_deg\":30,\"camera_theta_deg\":0,\"camera_phi_deg\":270,"
+                 "\"cylinder_radius_mm\":15}]}",
+                 rig[i]);
+        struct job_document *doc = job_document_of_text(text);
+        photograph_process_init(&k);
+        const char *folder = (const char *)*state;
+        assert_int_equal(photograph_process_load(&k, doc->setup, doc->rows, folder, NULL), STATUS_OK);
+        const struct job_photograph *column = doc->rows->photograph;
+        assert_true(doc->rows->n_photograph > 8 && column[0].column.number == 1);
+        assert_int_equal(photograph_develop(&k, folder, &column[3], &first, NULL, NULL), STATUS_OK);
+        assert_int_equal(rename(scratch_path(state, "roll.exr"), scratch_path(state, "away.exr")), 0);
+        assert_int_equal(photograph_develop(&k, folder, &column[7], &second, NULL, NULL), STATUS_OK);
+        assert_int_equal(rename(scratch_path(state, "away.exr"), scratch_path(state, "roll.exr")), 0);
+        struct column_views *kept = k.columns;
+        k.columns = NULL;
+        assert_int_equal(photograph_develop(&k, folder, &column[7], &again, NULL, NULL), STATUS_OK);
+        check_same_picture(&second, &again);
+        k.columns = kept;
+        image_release(&first);
+        image_release(&second);
+        image_release(&again);
+        photograph_process_release(&k);
+        job_document_free(doc);
+    }
+}
+
 static void check_refused(void **state, const char *extra, const char *section, const char *field, const char *part)
 {
     struct observation_set o;
@@ -315,53 +364,6 @@ static void test_refused(void **state)
     job_document_free(job_document_of_text(text));
 }
 
-/* Columns that scatter by 2 % about a cubic curve state an error of about 2 %: the median of 60 differences has a
- * standard error of 15 %, so within 45 %. A turn of the outline adds its share. */
-static void test_errors_of_columns(void **state)
-{
-    enum { N = 64 };
-    struct observation_set o;
-    struct rng rng;
-    (void)state;
-    observation_set_init(&o);
-    rng_start(&rng, &(struct rng_key){.seed = 8}, 0, 0);
-    for (size_t i = 0; i < N; i++) {
-        double normal[2];
-        rng_normal_pair(&rng, normal);
-        const double x = (double)i / N, smooth = 1.0 + x - x * x * x;
-        struct observation row = {.column = {.number = i + 1, .n = N, .angle_deg = (double)i}};
-        row.mean_rgb[0] = smooth * (1.0 + 0.02 * normal[0]);
-        row.mean_rgb[1] = smooth;
-        row.mean_rgb[2] = (double)i;
-        row.column.angle_se_deg = 0.5;
-        assert_int_equal(observation_set_append(&o, &row, NULL), STATUS_OK);
-    }
-    column_errors_add(&o, 0);
-    const double rel = o.item[0].se_rgb[0] / o.item[0].mean_rgb[0];
-    assert_true(rel > 0.011 && rel < 0.032);
-    assert_true(o.item[20].se_rgb[1] < 0.02);
-    assert_true(fabs(o.item[20].se_rgb[2] - 0.5) < 1e-9);
-    observation_set_release(&o);
-}
-
-/* Differences across a column that was left out are no error: a parabola states none, however many are left out. */
-static void test_columns_that_were_left_out(void **state)
-{
-    struct observation_set o;
-    (void)state;
-    observation_set_init(&o);
-    for (size_t i = 0, number = 1; i < 60; i++) {
-        const double x = (double)i / 60.0;
-        if (i % 6 == 5) continue;
-        struct observation row = {.column = {.number = number++, .n = 50, .angle_deg = 3.0 * (double)i}};
-        for (size_t c = 0; c < 3; c++) row.mean_rgb[c] = 0.1 + x * x;
-        assert_int_equal(observation_set_append(&o, &row, NULL), STATUS_OK);
-    }
-    column_errors_add(&o, 0);
-    for (size_t i = 0; i < o.n; i++) assert_true(o.item[i].se_rgb[1] < 1e-12 * o.item[i].mean_rgb[1]);
-    observation_set_release(&o);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -371,9 +373,8 @@ int main(void)
         cmocka_unit_test(test_outline_that_is_not_there),
         cmocka_unit_test_setup_teardown(test_rows_of_a_roll, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(test_rows_of_an_oblique_roll, scratch_folder_setup, scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(test_columns_read_once, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(test_refused, scratch_folder_setup, scratch_folder_teardown),
-        cmocka_unit_test(test_errors_of_columns),
-        cmocka_unit_test(test_columns_that_were_left_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
