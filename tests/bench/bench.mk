@@ -164,7 +164,7 @@ bench-camera: | deps-test ## mean radiances from raw files of a simulated camera
 
 # CYLINDER: options of the program, such as CYLINDER="--seeds 1 --keep build/bench-cylinder"
 .PHONY: bench-cylinder
-bench-cylinder: | deps-test ## parameters from two photographs of a cylinder beside those from 16 of flat cloth (half an hour of a core)
+bench-cylinder: | deps-test ## parameters from two photographs of a cylinder beside those from 16 of flat cloth (40 minutes of a core; continues when stopped)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/camera/bench_cylinder.py --build $(BUILD) $(CYLINDER)
 
