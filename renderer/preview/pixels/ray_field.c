@@ -4,7 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SMOOTH = 2 };
+/* SMOOTH: pixels to each side; ABOVE_ROUNDS times it is the reach of a filter. */
+enum { SMOOTH = 2, ABOVE_ROUNDS = RAY_REACH / SMOOTH };
 static const float cos_20_deg = 0.93969262f, least_of_cubic = 0.3f;
 
 status ray_field_init(struct ray_field *f, size_t width, size_t height, size_t n_side, size_t n_channel,
@@ -102,9 +103,14 @@ status ray_field_smooth_slopes(struct ray_field *f, struct error *err)
     const size_t n = f->width * f->height;
     float(*smooth)[2] = calloc(n, sizeof *smooth);
     if (smooth == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot filter a picture: out of memory");
-    for (size_t i = 0; i < n; i++)
-        if (f->pixel[i].used) mean_slopes(f, (long)(i % f->width), (long)(i / f->width), smooth[i]);
-    for (size_t i = 0; i < n; i++) memcpy(f->pixel[i].slope, smooth[i], sizeof smooth[i]);
+    for (int round = 0; round < (f->window == RAY_ABOVE ? ABOVE_ROUNDS : 1); round++) {
+        for (size_t i = 0; i < n; i++) {
+            const float *own = f->pixel[i].slope;
+            if (round > 0 && (own[0] != 0 || own[1] != 0)) continue;
+            if (f->pixel[i].used) mean_slopes(f, (long)(i % f->width), (long)(i / f->width), smooth[i]);
+        }
+        for (size_t i = 0; i < n; i++) memcpy(f->pixel[i].slope, smooth[i], sizeof smooth[i]);
+    }
     free(smooth);
     return STATUS_OK;
 }

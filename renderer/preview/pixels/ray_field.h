@@ -81,7 +81,8 @@ static inline float ray_field_offset(const struct ray_field *f, const struct ray
 /* Counts a slope, which is not 0. */
 void ray_pixel_meet(struct ray_pixel *p, float slope);
 /* Replaces slopes by their means over the 5 x 5 pixels around that have met anything, but not of receivers that
- * ray_pixel_near refuses: pixels near a shadow get the slopes of the occluder that casts it. STATUS_NO_MEMORY. */
+ * ray_pixel_near refuses: pixels near a shadow get the slopes of the occluder that casts it. Of RAY_ABOVE they go on to
+ * pixels that have met nothing, as far as a filter reaches. STATUS_NO_MEMORY. */
 status ray_field_smooth_slopes(struct ray_field *f, struct error *err);
 /* Whether q is a neighbour of p on the same smooth surface: near its plane, and at most 20 degrees from its normal
  * (section 5.5). */

@@ -27,8 +27,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Ways without a filter have up to MOST_RAW pictures of 8 x 8 rays. */
-enum { EDGE = 128, N = 3 * EDGE * EDGE, TRUTH_SEEDS = 16, MOST_SIDE = 8, MOST_RAW = 6, N_STEP = MOST_SIDE + MOST_RAW };
+/* Without a filter there are means of up to 1 + MOST_RAW pictures of 8 x 8 rays. */
+enum { EDGE = 128, N = 3 * EDGE * EDGE, TRUTH_SEEDS = 8, MOST_SIDE = 8, MOST_RAW = 3, N_STEP = MOST_SIDE + MOST_RAW };
 enum { N_EFFECT = 3, N_WAY = 4, SIDE = 3, WHOLE_SIDE = 4 };
 static const char *const effect[N_EFFECT] = {"shadow", "bounce", "lens"};
 static const enum ray_filter_way way[N_WAY] = {RAY_OWN, RAY_AXIS, RAY_WHOLE, RAY_PASSES};
