@@ -8,9 +8,10 @@
  *                       exp(-2 pi^2 sigma^2 |xi_3 H'_k + psi|^2 / lambda^2)|^2,
  *     sigma = l / 2,   A_c = pi sd^2 (1 - exp(-9))
  *
- * xi: wave_diffraction.h. Differs: H_k and the last factor are corrected for the curvature of the surface
- * (wave_height_straighten). Kernels are found by the hierarchy of wave_tree.h. Kernels beyond 3 standard deviations of
- * the direction at the longest wavelength are dropped, as published; at shorter wavelengths more are kept than needed.
+ * xi: wave_diffraction.h. Differs: kernels follow the curvature of the surface, with another last factor, and l is 1, 2
+ * or 4 texels (wave-glints.md). Kernels are found by the hierarchy of wave_tree.h. Kernels beyond 3 standard deviations
+ * of the direction at the longest wavelength are dropped, as published; at shorter wavelengths more are kept than
+ * needed.
  *
  * Frame: u, v on the surface in um, z its normal; wi and wo are unit vectors away from it. The tile repeats. f_r is per
  * steradian and 0 when a direction is below the surface. Nothing here shadows or reflects twice, so f_r belongs to
@@ -31,7 +32,7 @@ struct wave_glint_option {
     struct wave_height_option height;
     double coherence_um;   /* sd of the window: 2 texels to 20 texels, and 10 um as published */
     enum wave_model model; /* r_ghs is the usual one */
-    bool is_published;     /* kernels without the correction of wave_height_straighten, for comparison */
+    bool is_published;     /* flat kernels, one for each texel, for comparison */
 };
 
 struct wave_glint_option wave_glint_option_usual(void);

@@ -87,7 +87,7 @@ float wave_glint_pdf(const struct wave_glint *g, const struct wave_glint_query *
     if (!(q->wi[2] > 0 && q->wo[2] > 0)) return 0;
     const float per_slope = slope_of_direction(g, q->wi, q->wo, slope);
     const struct wave_window window = {{q->center_um[0], q->center_um[1]}, g->coherence_um};
-    const struct wave_direction d = {{-slope[0], -slope[1]}, 1, SAMPLE_REACH * g->wide, 0};
+    const struct wave_direction d = {{-slope[0], -slope[1]}, 1, SAMPLE_REACH * SAMPLE_REACH * g->wide * g->wide, 0};
     wave_tree_gather(&g->tree, &window, &d, &k);
     const float narrow2 = g->narrow * g->narrow, wide2 = g->wide * g->wide;
     const float share[2] = {(1 - WIDE_SHARE) / (2 * (float)M_PI * narrow2), WIDE_SHARE / (2 * (float)M_PI * wide2)};

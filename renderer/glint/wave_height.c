@@ -165,6 +165,6 @@ out:
 void wave_height_release(struct wave_height *h)
 {
     free(h->height_um);
-    free(h->gain);
+    free(h->curve_uu);
     *h = (struct wave_height){0};
 }

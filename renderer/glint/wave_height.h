@@ -32,7 +32,9 @@ struct wave_height {
     size_t n;
     float texel_um;
     float *height_um, *slope_u, *slope_v; /* slopes: derivative of the height along u and v, dimensionless */
-    float *gain;                          /* 0 until wave_height_straighten */
+    /* NULL until wave_height_curve: second derivatives, 1 / um; the variance of the term of the third order at normal
+     * deviates of a place with a standard deviation of 1 um, 1 / um^4 */
+    float *curve_uu, *curve_uv, *curve_vv, *third2;
 };
 
 /* A tile of 1024 texels of 1 um with bumps of 0.35 um at a correlation length of 8 um, without scratches. */
@@ -41,15 +43,10 @@ struct wave_height_option wave_height_option_usual(void);
 status wave_height_init(struct wave_height *h, const struct wave_height_option *o, struct error *err);
 void wave_height_release(struct wave_height *h);
 
-/* Corrects kernels of the standard deviation sigma_um for the curvature of the surface, which is not part of the
- * publication. A flat kernel stands for a phase whose curvatures are x_j / sigma^2, x_j = 2 pi xi_3 sigma^2 kappa_j /
- * lambda. Neighbouring kernels are not in phase, and their sum is the field over the product of (1 + i x_j)^(1/2). Each
- * kernel is therefore multiplied by this product. To the second order in x its argument is a change of height,
- * sigma^2 (kappa_1 + kappa_2) / 2, and the logarithm of its size is 2 pi^2 sigma^2 / lambda^2 times xi_3^2 gain,
- * gain = sigma^2 (kappa_1^2 + kappa_2^2) / 2, so both serve every wavelength. Beyond that order both are exact at
- * 0.5 um for xi_3 = 2. Changes the heights and fills in gain. STATUS_NO_MEMORY. */
-status wave_height_straighten(struct wave_height *h, double sigma_um, struct error *err);
-/* Root mean square of x_j for 0.5 um and xi_3 = 2. */
-double wave_height_bend(const struct wave_height *h, double sigma_um);
+/* Fills in the derivatives of the second and third order, as differences of the slopes. STATUS_NO_MEMORY. */
+status wave_height_curve(struct wave_height *h, struct error *err);
+/* Mean variance of the phase that a kernel of the standard deviation sigma_um leaves out, the term of the third order
+ * of 2 pi xi_3 H / lambda, in radians^2 at 0.5 um and xi_3 = 2. After wave_height_curve. */
+double wave_height_rest(const struct wave_height *h, double sigma_um);
 
 #endif

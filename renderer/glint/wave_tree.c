@@ -14,9 +14,10 @@ static void add_range(struct wave_range *to, const struct wave_range *r)
     to->high_u = fmaxf(to->high_u, r->high_u);
     to->low_v = fminf(to->low_v, r->low_v);
     to->high_v = fmaxf(to->high_v, r->high_v);
+    to->most2 = fmaxf(to->most2, r->most2);
 }
 
-static const struct wave_range no_range = {INFINITY, -INFINITY, INFINITY, -INFINITY};
+static const struct wave_range no_range = {INFINITY, -INFINITY, INFINITY, -INFINITY, 0};
 
 static void fill_leaf(struct wave_tree *t, const struct wave_height *h, size_t i, size_t j)
 {
@@ -30,8 +31,16 @@ static void fill_leaf(struct wave_tree *t, const struct wave_height *h, size_t i
             row->height_um[l] = h->height_um[at];
             row->slope_u[l] = h->slope_u[at];
             row->slope_v[l] = h->slope_v[at];
-            row->gain[l] = h->gain != NULL ? h->gain[at] : 0;
-            const struct wave_range one = {row->slope_u[l], row->slope_u[l], row->slope_v[l], row->slope_v[l]};
+            const float uu = h->curve_uu != NULL ? h->curve_uu[at] : 0, uv = h->curve_uu != NULL ? h->curve_uv[at] : 0,
+                        vv = h->curve_uu != NULL ? h->curve_vv[at] : 0;
+            row->curve_uu[l] = uu;
+            row->curve_uv[l] = uv;
+            row->curve_vv[l] = vv;
+            row->third2[l] = h->curve_uu != NULL ? h->third2[at] * powf(0.5F * t->step_um, 6) : 0;
+            const float most = 0.5F * fabsf(uu + vv) + sqrtf(0.25F * (uu - vv) * (uu - vv) + uv * uv);
+            row->most2[l] = most * most;
+            const struct wave_range one = {row->slope_u[l], row->slope_u[l], row->slope_v[l], row->slope_v[l],
+                                           row->most2[l]};
             add_range(range, &one);
         }
     }
@@ -52,7 +61,10 @@ static void fill_level(struct wave_tree *t, size_t level)
 status wave_tree_init(struct wave_tree *t, const struct wave_height *h, size_t stride, struct error *err)
 {
     const size_t n_leaf = h->n / stride / WAVE_LEAF;
-    *t = (struct wave_tree){.n = h->n / stride, .step_um = h->texel_um * (float)stride, .first_um = 0.5F * h->texel_um};
+    *t = (struct wave_tree){.n = h->n / stride,
+                            .step_um = h->texel_um * (float)stride,
+                            .first_um = 0.5F * h->texel_um,
+                            .is_curved = h->curve_uu != NULL};
     t->row = malloc(n_leaf * n_leaf * WAVE_LEAF * sizeof *t->row);
     bool whole = t->row != NULL;
     for (size_t side = n_leaf; side > 0; side /= 2) {
@@ -85,7 +97,7 @@ static bool reaches(const struct wave_range *r, const struct wave_direction *d)
 {
     const float u = off_interval(d->xi_3 * r->low_u + d->psi[0], d->xi_3 * r->high_u + d->psi[0]),
                 v = off_interval(d->xi_3 * r->low_v + d->psi[1], d->xi_3 * r->high_v + d->psi[1]);
-    return u * u + v * v <= d->reach * d->reach;
+    return u * u + v * v <= d->reach2 + d->widening * r->most2;
 }
 
 /* A query: the middle of the window and its radius, in distances of kernels from kernel 0. */
@@ -93,6 +105,7 @@ struct gathering {
     const struct wave_tree *t;
     const struct wave_direction *d;
     struct wave_gathered *to;
+    size_t n;                         /* kernels so far */
     float center[2], radius, per_sd2; /* per_sd2: 1 / (2 sd^2) */
 };
 
@@ -104,10 +117,20 @@ static bool is_near(const struct gathering *g, long i, long j, long side)
     return u * u + v * v <= g->radius * g->radius;
 }
 
-static void gather_leaf(const struct gathering *g, size_t i_leaf, long i, long j)
+/* Appends the lanes of `in`, a bit each, to a column of n numbers. */
+static inline void append(lanes *column, size_t n, unsigned in, lanes value)
+{
+    float *to = (float *)column + n;
+    if (in == (1U << LANES) - 1)
+        *(lanes *)to = value;
+    else
+        for (; in != 0; in &= in - 1) *to++ = value[__builtin_ctz(in)];
+}
+
+static void gather_leaf(struct gathering *g, size_t i_leaf, long i, long j)
 {
     const struct wave_direction *d = g->d;
-    const float step = g->t->step_um, reach2 = d->reach * d->reach;
+    const float step = g->t->step_um;
     lanes u;
     for (int l = 0; l < LANES; l++) u[l] = (float)(i + l) - g->center[0];
     for (long r = 0; r < WAVE_LEAF; r++) {
@@ -115,19 +138,29 @@ static void gather_leaf(const struct gathering *g, size_t i_leaf, long i, long j
         const float v = (float)(j + r) - g->center[1];
         const lanes a = d->xi_3 * row->slope_u + d->psi[0], b = d->xi_3 * row->slope_v + d->psi[1];
         const lanes bend = a * a + b * b, off2 = u * u + v * v;
-        const lane_mask in = (lane_mask)(bend <= reach2) & (lane_mask)(off2 <= g->radius * g->radius);
-        if (!lanes_any(in)) continue;
+        const lane_mask in =
+            (lane_mask)(bend <= d->reach2 + d->widening * row->most2) & (lane_mask)(off2 <= g->radius * g->radius);
+        const unsigned bits = lanes_bits(in);
+        if (bits == 0) continue;
         struct wave_gathered *to = g->to;
-        to->path_um[to->n] = d->xi_3 * row->height_um + (d->psi[0] * u + d->psi[1] * v) * step;
-        to->bend[to->n] = bend - d->growth * row->gain;
-        to->weight[to->n] = lanes_choose(in, lanes_exp_negative(-off2 * g->per_sd2), (lanes){0});
-        to->tilt[to->n] = d->psi[0] * row->slope_u + d->psi[1] * row->slope_v;
-        to->n++;
+        const size_t n = g->n;
+        g->n += (size_t)__builtin_popcount(bits);
+        append(to->path_um, n, bits, d->xi_3 * row->height_um + (d->psi[0] * u + d->psi[1] * v) * step);
+        append(to->bend, n, bits, bend);
+        append(to->weight, n, bits, lanes_exp_negative(-off2 * g->per_sd2));
+        append(to->tilt, n, bits, d->psi[0] * row->slope_u + d->psi[1] * row->slope_v);
+        if (g->t->is_curved) {
+            const lanes uu = d->xi_3 * row->curve_uu, uv = d->xi_3 * row->curve_uv, vv = d->xi_3 * row->curve_vv;
+            append(to->trace, n, bits, uu + vv);
+            append(to->det, n, bits, uu * vv - uv * uv);
+            append(to->third2, n, bits, d->xi_3 * d->xi_3 * row->third2);
+            append(to->across, n, bits, a * a * vv - 2 * a * b * uv + b * b * uu);
+        }
     }
 }
 
 /* Node of a level whose first kernel is (i, j); these run on beyond the tile, which repeats. */
-static void gather_node(const struct gathering *g, size_t level, long i, long j)
+static void gather_node(struct gathering *g, size_t level, long i, long j)
 {
     const long side = (long)WAVE_LEAF << level;
     const size_t n_side = g->t->n / WAVE_LEAF >> level, mask = n_side - 1;
@@ -154,7 +187,6 @@ void wave_tree_gather(const struct wave_tree *t, const struct wave_window *w, co
     struct gathering g = {t, d, to, .radius = (float)(WINDOW_REACH * sd), .per_sd2 = (float)(1 / (2 * sd * sd))};
     size_t level = 0;
     long first[2];
-    to->n = 0;
     while (level + 1 < t->n_level && (float)((long)WAVE_LEAF << level) < 2 * g.radius) level++;
     const long side = (long)WAVE_LEAF << level;
     for (int k = 0; k < 2; k++) {
@@ -163,6 +195,9 @@ void wave_tree_gather(const struct wave_tree *t, const struct wave_window *w, co
     }
     for (long j = first[1]; (float)j <= g.center[1] + g.radius; j += side)
         for (long i = first[0]; (float)i <= g.center[0] + g.radius; i += side) gather_node(&g, level, i, j);
+    to->n = (g.n + LANES - 1) / LANES;
+    lanes *const column[] = {to->path_um, to->bend, to->weight, to->tilt, to->trace, to->det, to->across, to->third2};
+    for (size_t k = 0; k < sizeof column / sizeof *column; k++) *(lanes *)((float *)column[k] + g.n) = (lanes){0};
 }
 
 void wave_tree_slope(const struct wave_tree *t, const double place_um[2], float slope[2])

@@ -106,27 +106,30 @@ static struct comparison lobe(const struct wave_glint_option *o, float wavelengt
     return c;
 }
 
-/* The correction of kernels for curvature leaves terms of the third order in x = 2 pi xi_3 sigma^2 kappa / lambda. x is
- * 0.12 for the usual bumps at 0.5 um: 0.002 of the field. As published, without it, the second order is left:
- * x^2 / 2 of the intensity for each axis, 1.5 %, and the correlation is lower. */
+/* Curved kernels leave the third order of the phase: V is its variance (wave_height_rest) at 0.5 um, and the mean is
+ * corrected by V / 2. Bumps of 8 um have kernels of 2 um, V = 0.04 and 0.07 at 0.39 um, so V^2 = 0.005 of the mean is
+ * left. Bumps of 6.5 um have kernels of 1 um and V = 0.002. As published kernels are flat: they lose half of the square
+ * of x = 2 pi xi_3 sigma^2 kappa / lambda for each axis, 0.12 at 8 um. */
 static void test_lobes_are_those_of_the_whole_patch(void **state)
 {
     (void)state;
     const float um[] = {0.389375F, 0.5F, 0.800625F};
-    for (size_t i = 0; i < sizeof um / sizeof *um; i++) {
-        struct wave_glint_option o = small_option(0.35, 8);
+    for (size_t i = 0; i < 2 * (sizeof um / sizeof *um); i++) {
+        const bool is_fine = i % 2 != 0;
+        struct wave_glint_option o = small_option(0.35, is_fine ? 6.5 : 8);
         o.model = WAVE_OHS;
-        const struct comparison ours = lobe(&o, um[i]);
+        const struct comparison ours = lobe(&o, um[i / 2]);
         o.is_published = true;
-        const struct comparison published = lobe(&o, um[i]);
-        print_message("%.3f um: mean %.5f, correlation %.6f; as published %.5f, %.6f\n", (double)um[i],
+        const struct comparison published = lobe(&o, um[i / 2]);
+        print_message("%.3f um: mean %.5f, correlation %.6f; as published %.5f, %.6f\n", (double)um[i / 2],
                       ours.got / ours.want, correlation(&ours), published.got / published.want,
                       correlation(&published));
-        assert_true(fabs(ours.got / ours.want - 1) < 0.002);
-        assert_true(correlation(&ours) > 0.9999);
-        assert_true(fabs(published.got / published.want - 1) < 0.04);
+        assert_true(fabs(ours.got / ours.want - 1) < (is_fine ? 0.002 : 0.005));
+        assert_true(correlation(&ours) > (is_fine ? 0.9998 : 0.996));
+        assert_true(correlation(&ours) > correlation(&published));
+        assert_true(fabs(published.got / published.want - 1) < (is_fine ? 0.12 : 0.04));
         assert_true(fabs(published.got / published.want - 1) > fabs(ours.got / ours.want - 1));
-        assert_true(correlation(&published) > 0.99);
+        assert_true(correlation(&published) > (is_fine ? 0.97 : 0.99));
     }
 }
 
@@ -165,7 +168,7 @@ static void test_models_are_their_integrals(void **state)
 {
     (void)state;
     const float um = 0.55F;
-    struct wave_glint_option o = small_option(0.35, 8);
+    struct wave_glint_option o = small_option(0.35, 6.5);
     struct wave_oracle oracle = oracle_of(&o);
     for (int m = 0; m < WAVE_N_MODEL; m++) {
         const struct rng_key key = {5, 0, 0, 0};

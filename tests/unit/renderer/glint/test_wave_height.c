@@ -1,5 +1,5 @@
-/* Height fields of wave optics: stated heights and correlation lengths, slopes against differences of the heights, the
- * repeating tile, values that are refused. */
+/* Height fields of wave optics: stated heights and correlation lengths, slopes against differences of the heights,
+ * second and third derivatives against their variances, the repeating tile, values that are refused. */
 #include "renderer/glint/wave_height.h"
 
 #include <math.h>
@@ -141,12 +141,35 @@ static void test_values_out_of_range_are_refused(void **state)
     is_refused(&o);
 }
 
+/* A correlation rms^2 exp(-(x^2 + y^2) / l^2) has the moments 12, 4 rms^2 / l^4 of h_uu, h_uv, and 120, 24, 24
+ * rms^2 / l^6 of h_uuu^2, h_uuv^2, h_uuu h_uvv: the variance of the third order is
+ * (30 120 + 54 24 + 36 24) / 36 = 160 rms^2 / l^6. Some 2,000 independent places: 4 standard errors are 0.13. */
+static void test_curvatures_have_their_variance(void **state)
+{
+    (void)state;
+    struct wave_height_option o = wave_height_option_usual();
+    o.length_um[0] = o.length_um[1] = 16;
+    struct wave_height h = field_of(&o);
+    double uu = 0, uv = 0, vv = 0;
+    const double n2 = (double)(h.n * h.n), unit = 0.35 * 0.35 / pow(16, 4);
+    assert_int_equal(wave_height_curve(&h, NULL), STATUS_OK);
+    for (size_t k = 0; k < h.n * h.n; k++) {
+        uu += pow((double)h.curve_uu[k], 2) / n2;
+        uv += pow((double)h.curve_uv[k], 2) / n2;
+        vv += pow((double)h.curve_vv[k], 2) / n2;
+    }
+    assert_true(fabs(uu / (12 * unit) - 1) < 0.13);
+    assert_true(fabs(uv / (4 * unit) - 1) < 0.13);
+    assert_true(fabs(vv / (12 * unit) - 1) < 0.13);
+    assert_true(fabs(wave_height_rest(&h, 1) / (pow(2 * M_PI * 2 / 0.5, 2) * 160 * unit / 256) - 1) < 0.13);
+    wave_height_release(&h);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_heights_and_lengths_are_as_stated),
-        cmocka_unit_test(test_slopes_are_derivatives),
-        cmocka_unit_test(test_seeds_differ_and_repeat),
+        cmocka_unit_test(test_heights_and_lengths_are_as_stated), cmocka_unit_test(test_slopes_are_derivatives),
+        cmocka_unit_test(test_curvatures_have_their_variance),    cmocka_unit_test(test_seeds_differ_and_repeat),
         cmocka_unit_test(test_values_out_of_range_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
