@@ -102,8 +102,11 @@ static status cut_column(const struct photograph_process *k, const struct job_ph
     if (p->column.number == 0) return STATUS_OK;
     e->record[0].is_column = true;
     if (!photograph_process_has_lens(k)) e->record[0].saturated_share = saturated_in_crop(e, whole);
-    status s = column_picture_cut(corner, p->crop_px, &e->image[0], err);
-    return s == STATUS_OK && e->variance.pixel != NULL ? column_picture_cut(corner, p->crop_px, &e->variance, err) : s;
+    const double(*place)[2] = (const double(*)[2])e->record[0].info.sample_px;
+    status s = column_picture_cut(corner, p->crop_px, place, &e->image[0], err);
+    return s == STATUS_OK && e->variance.pixel != NULL
+               ? column_picture_cut(corner, p->crop_px, place, &e->variance, err)
+               : s;
 }
 
 status photograph_develop(const struct photograph_process *k, const char *folder, const struct job_photograph *p,

@@ -37,6 +37,7 @@ struct photograph_info {
     unsigned orientation;      /* of Exif and TIFF, 1 to 8, 1 where it is not stated; already applied */
     unsigned exif_color_space; /* 1: sRGB, 2: Adobe RGB, 65535: uncalibrated; 0: not stated */
     bool auto_balance;         /* the camera chose the white balance by the picture */
+    double sample_px[3][2];    /* where a pixel's samples of each channel lie from its middle, right and down */
     double to_rec709[9];       /* from the file's primaries, row-major; all 0 where it states none */
     char camera[96];           /* maker and model; "": not stated */
     struct file_ledger ledger; /* every statement of the file, also those above */

@@ -95,6 +95,17 @@ static void convert_primaries(struct image *im, struct photograph_info *info)
     for (int c = 0; c < 3; c++) info->saturation[c] = any ? (double)limit : INFINITY;
 }
 
+/* Turns the places of the samples as `turn` turns pixels. */
+static void turn_samples(unsigned k, double place[3][2])
+{
+    for (size_t c = 0; c < 3; c++) {
+        const double across = k == 2 || k == 3 || k == 7 || k == 8 ? -place[c][0] : place[c][0];
+        const double down = k == 3 || k == 4 || k == 6 || k == 7 ? -place[c][1] : place[c][1];
+        place[c][0] = k >= 5 ? down : across;
+        place[c][1] = k >= 5 ? across : down;
+    }
+}
+
 /* Turns the picture as viewers show it: orientation k of Exif says where the first row and column
  * of the file belong. */
 static status turn(struct image *im, struct photograph_info *info, struct error *err)
@@ -114,6 +125,7 @@ static status turn(struct image *im, struct photograph_info *info, struct error 
     info->orientation = k;
     file_ledger_add(&info->ledger, "orientation", NULL, "%u, %s", k, meaning[k]);
     if (k == 1) return STATUS_OK;
+    turn_samples(k, info->sample_px);
     const bool exchanged = k >= 5;
     struct image out;
     status s = image_init(&out, exchanged ? im->height : im->width, exchanged ? im->width : im->height, 3, err);

@@ -3,7 +3,8 @@
  *
  * A picture of a Bayer sensor becomes one pixel for each cell of 2 x 2 samples: red, the mean of both greens, and blue,
  * as they were measured. It has half of the sensor's width and height, and noise of neighbouring pixels stays
- * independent. Monochrome sensors and linear rgb keep their size. The orientation is stated, and applied later. Values
+ * independent; info->sample_px says where in the cell each color lies. Monochrome sensors and linear rgb keep their
+ * size. The orientation is stated, and applied later. Values
  * are (sample - black) / (white - black), neither clamped at 0 nor cut at 1; a pixel with a sample at or above the
  * camera's limit is at least 1. */
 #include "base/files/durable.h"
@@ -86,6 +87,16 @@ static void take_cell(libraw_data_t *lr, const struct raw_levels *k, unsigned y,
     put_pixel(pixel, rgb, saturated);
 }
 
+/* Where the samples of each channel lie from the middle of a cell, in cells. */
+static void place_samples(libraw_data_t *lr, double place[3][2])
+{
+    for (int i = 0; i < 4; i++) {
+        const int c = channel_of(lr, libraw_COLOR(lr, i / 2, i % 2));
+        place[c][0] += (c == 1 ? 0.5 : 1.0) * (0.5 * (i % 2) - 0.25);
+        place[c][1] += (c == 1 ? 0.5 : 1.0) * (0.5 * (i / 2) - 0.25);
+    }
+}
+
 static void take_sample(const libraw_data_t *lr, const struct raw_levels *k, unsigned y, unsigned x, float pixel[3])
 {
     double rgb[3];
@@ -102,7 +113,7 @@ static void take_sample(const libraw_data_t *lr, const struct raw_levels *k, uns
 }
 
 static status take_picture(libraw_data_t *lr, const char *name, const struct raw_levels *k, struct image *im,
-                           struct error *err)
+                           struct photograph_info *info, struct error *err)
 {
     bool mosaic = lr->rawdata.raw_image != NULL && lr->idata.filters != 0;
     if (mosaic && !is_bayer(lr))
@@ -114,6 +125,7 @@ static status take_picture(libraw_data_t *lr, const char *name, const struct raw
     if (width == 0 || height == 0 || lr->sizes.width + lr->sizes.left_margin > lr->sizes.raw_width ||
         lr->sizes.height + lr->sizes.top_margin > lr->sizes.raw_height)
         return error_set(err, STATUS_FORMAT, "cannot read photograph '%s': it has no picture", name);
+    if (mosaic) place_samples(lr, info->sample_px);
     status s = image_init(im, width, height, 3, err);
     for (unsigned y = 0; y < height && s == STATUS_OK; y++)
         for (unsigned x = 0; x < width; x++)
@@ -183,7 +195,7 @@ static status decode(libraw_data_t *lr, const char *path, const struct photograp
     static const unsigned orientation_of_flip[8] = {1, 2, 4, 3, 5, 8, 6, 7};
     info->orientation = orientation_of_flip[lr->sizes.flip & 7];
     snprintf(info->camera, sizeof info->camera, "%.40s %.40s", lr->idata.make, lr->idata.model);
-    return take_picture(lr, name, &k, im, err);
+    return take_picture(lr, name, &k, im, info, err);
 }
 
 static void ignore_data_error(void *context, const char *file, const int offset)

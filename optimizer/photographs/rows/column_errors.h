@@ -12,10 +12,10 @@
  * with M the matrix that leaves the residuals about a line and T the one of neighbours (method of moments). The mean of
  * n parts has the variance v (1 + 2 r (n - 1) / n) / n; columns of three parts or fewer keep their plain scatter.
  *
- * Differences between columns are no measure of errors: a highlight of a few columns looks like noise. The fit finds
- * errors that show between columns alone, as those of threads along the axis that alias with the pixels (1.4 % in
- * columns of 8 pixels, NOTES.md): it takes what residuals leave beyond the stated errors as misfit, in the weights of
- * rows and in the errors of parameters (linear_model.h).
+ * Differences between columns are no measure of errors: a highlight of a few columns looks like noise. Errors that show
+ * between columns alone, as of threads along the axis that alias with the pixels, are the fit's to find: it takes what
+ * residuals leave beyond the stated errors as misfit, in the weights of rows and in the errors of parameters
+ * (linear_model.h).
  *
  * The outline's error turns all columns of a photograph by column.angle_se_deg: the column's radiance changes by this
  * angle times the slope between its neighbours.

@@ -6,7 +6,7 @@ A twill of known fibers (two_lobe.v1) is rendered flat in the 16 configurations 
 (figure 5.22 of the fabric thesis has such photographs). Both are taken by simulated cameras (selvedge-phantom camera), one for each seed: raw
 files of three exposures with noise, a lens that darkens and distorts, a chart, markers around the sample. Jobs fit the nine parameters to the
 flat photographs and to the columns of the cylinders; the worker finds the outline of each cylinder in its picture. All cameras see the same
-renderings, whose noise of tracing is most of the error of a column; photographs of a cloth have none.
+renderings, and each has its own noise, of the camera and of the fit.
 
 Finished steps are kept in the folder: an interrupted run goes on, and fits of another program are made anew. Progress is on standard error.
 
@@ -31,7 +31,8 @@ import time
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..", ".."))
 TRUTH = {"C_R": [0.06, 0.05, 0.08], "C_TT": [0.72, 0.55, 0.35], "beta_R": 4, "beta_TT": 20, "gamma_TT": 18}
-RADIUS_MM, LENGTH_MM, STEP_DEG, LIMIT_DEG, WIDTH_MM, SAMPLES = 15, 30, 6, 80, 34, 512
+RADIUS_MM, LENGTH_MM, STEP_DEG, LIMIT_DEG, WIDTH_MM, SAMPLES = 15, 10, 6, 80, 34, 256
+PATHS = 12000000  # of a fit: with 3 million the noise of its renderings is most of the error
 # lamp theta and phi, turn of the cloth; the camera is above, the axis upright in its picture. These two determine the parameters best by
 # linear propagation of errors (optimizer/photographs/NOTES.md): a highlight's profile, and crossed planes with forward scattering
 CYLINDERS = [(10, 30, 90), (70, 60, 0)]
@@ -145,7 +146,7 @@ def fit(arguments, raw, hair, folder, keys, seed):
     shutil.copytree(raw, os.path.join(folder, "input"))
     shutil.copy(hair, os.path.join(folder, "input", "truth.hair"))
     document = dict(keys, sample="recovery", fibers={"file": "truth.hair"},
-                    fit={"model": "two_lobe.v1", "path_budget": 100000 if arguments.quick else 3000000, "seed": 2 + seed, "render_px": 32,
+                    fit={"model": "two_lobe.v1", "path_budget": 100000 if arguments.quick else PATHS, "seed": 2 + seed, "render_px": 32,
                          "render_samples": 4})
     dump(document, folder, "job.json")
     run(arguments, "selvedge-worker", "--quiet", folder)
@@ -209,7 +210,7 @@ def compare(arguments, kept, program):
                 "one": (raw["wrapped"], dict(cylinders, photographs=cylinders["photographs"][:1]))}
         for what, (source, keys) in jobs.items():
             job = os.path.join(folder, f"{what}-job-{seed}")
-            parameters = kept.step(f"{what}-fit-{seed}", [program, keys],
+            parameters = kept.step(f"{what}-fit-{seed}", [program, keys, PATHS],
                                    lambda job=job, source=source, keys=keys: fit(arguments, source, hair, job, keys, seed))
             found[what].append(differences(parameters, what))
     return found

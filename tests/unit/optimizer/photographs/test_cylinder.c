@@ -7,6 +7,7 @@
 #include "optimizer/job/document/job_setup.h"
 #include "optimizer/photographs/camera/photograph_develop.h"
 #include "optimizer/photographs/camera/photograph_process_load.h"
+#include "optimizer/photographs/cylinder/column_picture.h"
 #include "optimizer/photographs/cylinder/cylinder_edges.h"
 #include "optimizer/photographs/cylinder/cylinder_view.h"
 #include "optimizer/photographs/rows/observation_load.h"
@@ -364,6 +365,24 @@ static void test_refused(void **state)
     job_document_free(job_document_of_text(text));
 }
 
+/* Light that rises across the picture is the same in all channels, wherever in a pixel their samples lie. */
+static void test_places_of_colors(void **state)
+{
+    static const double place[3][2] = {{-0.25, -0.25}, {0, 0}, {0.25, 0.25}},
+                        corner[4][2] = {{104, 52}, {112, 52}, {112, 58}, {104, 58}};
+    struct image im;
+    (void)state;
+    assert_int_equal(image_init(&im, 20, 10, 3, NULL), STATUS_OK);
+    for (size_t i = 0; i < 3 * 20 * 10; i++)
+        im.pixel[i] =
+            (float)(3.0 * ((double)(i / 3 % 20) + place[i % 3][0]) + 2.0 * ((double)(i / 60) + place[i % 3][1]));
+    assert_int_equal(column_picture_cut(corner, (const size_t[2]){100, 50}, place, &im, NULL), STATUS_OK);
+    assert_true(im.width == 8 && im.height == 6);
+    for (size_t i = 0; i < 3 * 8 * 6; i++)
+        assert_true(fabs((double)im.pixel[i] - 3.0 * (double)(4 + i / 3 % 8) - 2.0 * (double)(2 + i / 24)) < 1e-4);
+    image_release(&im);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -371,6 +390,7 @@ int main(void)
         cmocka_unit_test(test_mean_angle),
         cmocka_unit_test(test_outline),
         cmocka_unit_test(test_outline_that_is_not_there),
+        cmocka_unit_test(test_places_of_colors),
         cmocka_unit_test_setup_teardown(test_rows_of_a_roll, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(test_rows_of_an_oblique_roll, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(test_columns_read_once, scratch_folder_setup, scratch_folder_teardown),

@@ -243,6 +243,12 @@ static void test_turned_dng(void **state)
         read_ok(path, &no_transfer, &im, &r);
         assert_true(r.info.orientation == k && im.width == (k < 5 ? 20 : 12) && im.height == (k < 5 ? 12 : 20));
         const bool from_right[9] = {0, 0, 1, 1, 0, 0, 0, 1, 1}, from_below[9] = {0, 0, 0, 1, 1, 0, 1, 1, 0};
+        /* the red sample lies in the upper left of the cell as it is in the file */
+        const bool flip[2] = {k < 5 ? from_right[k] : from_below[k], k < 5 ? from_below[k] : from_right[k]};
+        for (size_t a = 0; a < 2; a++) {
+            assert_true(r.info.sample_px[0][a] == (flip[a] ? 0.25 : -0.25) && r.info.sample_px[1][a] == 0.0);
+            assert_true(r.info.sample_px[2][a] == -r.info.sample_px[0][a]);
+        }
         for (size_t y = 0; y < im.height; y++)
             for (size_t x = 0; x < im.width; x++) { /* of a column or row from 5 on, rows and columns are exchanged */
                 size_t column = k < 5 ? x : y, row = k < 5 ? y : x;
