@@ -10,20 +10,29 @@ static void unit(double v[3])
     for (int a = 0; a < 3 && length > 0.0; a++) v[a] /= length;
 }
 
-/* The mean of the way from the lower to the upper end at the corners of a face. Nodes 2 i and 2 i + 1 are the two ends
- * of position i. */
-static void normal_at(const struct shell *s, const uint32_t node[3], const float uv[2], double normal[3])
+/* normal: the mean of the way from the lower to the upper end at the corners of a face. upper: the mean of the upper
+ * ends. Nodes 2 i and 2 i + 1 are the two ends of position i. */
+static void normal_at(const struct shell *s, const uint32_t node[3], const float uv[2], double normal[3],
+                      double upper[3])
 {
     const double share[3] = {1.0 - (double)uv[0] - (double)uv[1], (double)uv[0], (double)uv[1]};
-    for (int a = 0; a < 3; a++) normal[a] = 0.0;
+    for (int a = 0; a < 3; a++) normal[a] = upper[a] = 0.0;
     for (int k = 0; k < 3; k++) {
         const float *low = s->node_mm[node[k] & ~1u], *high = s->node_mm[node[k] | 1u];
         double way[3];
         for (int a = 0; a < 3; a++) way[a] = (double)high[a] - (double)low[a];
         unit(way);
-        for (int a = 0; a < 3; a++) normal[a] += share[k] * way[a];
+        for (int a = 0; a < 3; a++) {
+            normal[a] += share[k] * way[a];
+            upper[a] += share[k] * (double)high[a];
+        }
     }
     unit(normal);
+}
+
+static bool is_cut_edge(const uint32_t node[3])
+{
+    return (node[0] & 1u) != (node[1] & 1u) || (node[0] & 1u) != (node[2] & 1u);
 }
 
 static void weft_at(const struct shell_cell *c, const double normal[3], double weft[3])
@@ -52,11 +61,13 @@ bool scene_proxy_trace(const struct scene *scene, const double o[3], const doubl
     rtcInitIntersectContext(&context);
     rtcIntersect1(space->outer, &context, &q);
     if (q.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-    const uint32_t face = q.hit.primID;
+    const uint32_t face = q.hit.primID, *node = space->shell.outer[face];
+    double upper[3];
     hit->distance_mm = (double)q.ray.tfar;
     hit->lower = space->shell.outer_bottom[face];
     for (int a = 0; a < 3; a++) hit->position_mm[a] = o[a] + hit->distance_mm * d[a];
-    normal_at(&space->shell, space->shell.outer[face], (const float[2]){q.hit.u, q.hit.v}, hit->normal);
+    normal_at(&space->shell, node, (const float[2]){q.hit.u, q.hit.v}, hit->normal, upper);
+    if (is_cut_edge(node)) memcpy(hit->position_mm, upper, sizeof upper);
     weft_at(&space->shell.cell[space->shell.outer_cell[face]], hit->normal, hit->weft);
     return true;
 }

@@ -2,6 +2,7 @@
  * a lens on folds against many rays, and the four passes against the whole sum. */
 #include "renderer/preview/proxy/proxy_layers.h"
 #include "renderer/preview/proxy/proxy_picture.h"
+#include "renderer/scene/scene_place.h"
 #include "tests/support/cloth/proxy_cloth.h"
 
 #include <math.h>
@@ -192,6 +193,23 @@ static void a_lamp_in_the_plane_of_the_cloth_counts_both_sides(void **state)
     proxy_cloth_release(&c);
 }
 
+/* A ray that meets the cut edge half-way up is told the place on the upper side: rays from there see no other part of
+ * the edge. */
+static void a_cut_edge_counts_as_the_upper_side(void **state)
+{
+    (void)state;
+    struct proxy_cloth c;
+    struct scene_proxy_hit top, edge;
+    proxy_cloth_init(&c, false);
+    const double above[3] = {0, 0, 100}, down[3] = {0, 0, -1}, along[3] = {0, 1, 0},
+                 beside[3] = {0.5, -100, scene_lowest_mm(c.bent) + 0.5 * scene_thickness_mm(c.bent)};
+    assert_true(scene_proxy_trace(c.bent, above, down, 0, &top) && scene_proxy_trace(c.bent, beside, along, 0, &edge));
+    assert_true(top.position_mm[2] - beside[2] > 0.4 * scene_thickness_mm(c.bent));
+    assert_true(fabs(edge.position_mm[2] - top.position_mm[2]) < 1e-4 && !edge.lower);
+    assert_true(fabs(edge.position_mm[0] - 0.5) < 1e-3 && fabs(edge.position_mm[1] + 30) < 1e-3);
+    proxy_cloth_release(&c);
+}
+
 /* Rays from all places of a lens through one point of the picture meet in the plane in focus. */
 static void rays_of_a_lens_meet_in_focus(void **state)
 {
@@ -260,6 +278,7 @@ int main(void)
         cmocka_unit_test(a_white_sky_shows_the_albedo),
         cmocka_unit_test(folds_are_near_many_rays),
         cmocka_unit_test(a_lamp_in_the_plane_of_the_cloth_counts_both_sides),
+        cmocka_unit_test(a_cut_edge_counts_as_the_upper_side),
         cmocka_unit_test(rays_of_a_lens_meet_in_focus),
         cmocka_unit_test(threads_and_faults),
     };
