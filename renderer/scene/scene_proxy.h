@@ -12,9 +12,9 @@ struct scene;
 struct scene_proxy_hit {
     double distance_mm;
     double position_mm[3]; /* on a cut edge: on the upper side there, so that rays that go on leave the cloth */
-    double normal[3]; /* unit, from the lower to the upper side of the cloth */
-    double weft[3];   /* unit, at a right angle with the normal: the x axis of the flat cloth */
-    bool lower;       /* the lower side was hit */
+    double normal[3];      /* unit, from the lower to the upper side of the cloth */
+    double weft[3];        /* unit, at a right angle with the normal: the x axis of the flat cloth */
+    bool lower;            /* the lower side was hit */
 };
 
 /* The first face along a ray of unit direction from `from_mm` on. False: there is none. scene: bent. */
