@@ -4,6 +4,9 @@
 #include <math.h>
 #include <stdio.h>
 
+_Static_assert((int)FILM_MAX_GROUP >= (int)CLOTH_MAX_KIND + 1,
+               "each kind of yarn may have a film, and there are sequins");
+
 size_t cloth_n_fiber_kind(const struct cloth_description *d)
 {
     size_t n = 0;

@@ -1,6 +1,28 @@
 #include "base/catalogue/film_material.h"
 
+#include <math.h>
 #include <string.h>
+
+/* Brushed films have waves that are longer along the film by this factor, up to the tile. */
+#define BRUSHED_RATIO 12.0
+#define WAVE_TILE_UM 1024.0
+
+void film_waves_of(const struct film_material *m, struct film_waves *w)
+{
+    const double grain = fmin(fmax((double)m->grain_um, FILM_LEAST_WAVE_GRAIN_UM), FILM_MOST_WAVE_GRAIN_UM),
+                 slope = fmin((double)m->roughness, FILM_MOST_SLOPE),
+                 along = m->surface == FILM_BRUSHED ? fmin(BRUSHED_RATIO * grain, WAVE_TILE_UM) : grain;
+    *w = (struct film_waves){.rms_um = slope / (M_SQRT2 * hypot(1 / along, 1 / grain)), .length_um = {along, grain}};
+    if (m->surface != FILM_SCRATCHES) return;
+    w->rms_um *= 0.5;
+    w->scratch_width_um = fmax(grain / 6, 1.5);
+    w->scratch_depth_um = slope * w->scratch_width_um;
+}
+
+bool film_waves_are_low(const struct film_waves *w)
+{
+    return w->rms_um <= FILM_MOST_WAVE_HEIGHT_UM && w->scratch_depth_um <= FILM_MOST_WAVE_HEIGHT_UM;
+}
 
 /* Reflectance at normal incidence of evaporated metals at 630, 532 and 465 nm, from their complex index n + ik:
  * ((n - 1)^2 + k^2) / ((n + 1)^2 + k^2). Indices after Palik 1985, "Handbook of Optical Constants of Solids". */

@@ -33,12 +33,23 @@ struct film_material {
 #define FILM_MOST_SLOPE 0.5
 #define FILM_LEAST_WAVE_GRAIN_UM 4.0
 #define FILM_MOST_WAVE_GRAIN_UM 128.0
+#define FILM_MOST_WAVE_HEIGHT_UM 10.0
 
 /* Whether light is reflected as waves. */
 static inline bool film_has_waves(const struct film_material *m)
 {
     return m->optics != FILM_RAYS && m->surface != FILM_SMOOTH && m->surface != FILM_FLAKES;
 }
+
+/* The height field of a film with waves, in um: root mean square and correlation lengths along and across the film, and
+ * scratches' depth and the standard deviation of their section, 0 without scratches. Noise has slopes of the root mean
+ * square `roughness` in two dimensions, beside scratches half of it; scratches are as steep as that. */
+struct film_waves {
+    double rms_um, length_um[2], scratch_depth_um, scratch_width_um;
+};
+void film_waves_of(const struct film_material *m, struct film_waves *w);
+/* Whether these heights are at most FILM_MOST_WAVE_HEIGHT_UM. */
+bool film_waves_are_low(const struct film_waves *w);
 
 /* The films of a cloth: material k belongs to group first_group + k. */
 struct film_groups {

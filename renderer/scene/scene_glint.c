@@ -64,26 +64,20 @@ static status make(const struct film_material *m, uint64_t seed, struct glint_su
     return glint_surface_new(&o, out, err);
 }
 
-/* The heights of a film with waves. Grains are at most an eighth of the tile; slopes of noise have
- * the root mean square that glint_surface has, in two dimensions. A scratched film has 0.3 of its tile covered by
- * grooves as steep as that, on noise of half of it. */
+/* Scratches cover 0.3 of the tile. */
 static status make_waves(const struct film_material *m, uint64_t seed, struct wave_glint **out, struct error *err)
 {
     struct wave_glint_option o = wave_glint_option_usual();
-    const double side_um = (double)o.height.n * o.height.texel_um,
-                 grain = fmin(fmax((double)m->grain_um, FILM_LEAST_WAVE_GRAIN_UM), FILM_MOST_WAVE_GRAIN_UM),
-                 slope = fmin((double)m->roughness, FILM_MOST_SLOPE);
+    struct film_waves w;
+    film_waves_of(m, &w);
     o.model = (enum wave_model)(m->optics - FILM_OHS);
     o.height.seed = seed;
-    o.height.length_um[0] = m->surface == FILM_BRUSHED ? fmin((double)BRUSHED_RATIO * grain, side_um) : grain;
-    o.height.length_um[1] = grain;
-    o.height.rms_um = slope / (M_SQRT2 * hypot(1 / o.height.length_um[0], 1 / o.height.length_um[1]));
-    if (m->surface == FILM_SCRATCHES) {
-        o.height.rms_um *= 0.5;
-        o.height.scratch_width_um = fmax(grain / 6, 1.5);
-        o.height.scratch_depth_um = slope * o.height.scratch_width_um;
-        o.height.n_scratch = (size_t)(0.3 * side_um / (0.2 * 4 * o.height.scratch_width_um));
-    }
+    memcpy(o.height.length_um, w.length_um, sizeof w.length_um);
+    o.height.rms_um = w.rms_um;
+    o.height.scratch_width_um = w.scratch_width_um;
+    o.height.scratch_depth_um = w.scratch_depth_um;
+    if (w.scratch_width_um > 0)
+        o.height.n_scratch = (size_t)(0.3 * (double)o.height.n * o.height.texel_um / (0.2 * 4 * w.scratch_width_um));
     return wave_glint_new(&o, out, err);
 }
 

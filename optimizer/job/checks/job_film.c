@@ -40,6 +40,8 @@ status job_film_check_keys(const struct json_field *f, const char *prefix, const
     if (s != STATUS_OK || json_object_get(f->object, size_key) == NULL) return s;
     struct film_material m = {.optics = FILM_RAYS};
     job_film_take_material(film, &m);
+    struct film_waves w;
+    film_waves_of(&m, &w);
     const bool smooth = m.surface == FILM_SMOOTH, waves = m.optics != FILM_RAYS;
     const struct {
         const char *key;
@@ -53,6 +55,8 @@ status job_film_check_keys(const struct json_field *f, const char *prefix, const
          film_has_waves(&m) &&
              !(film->grain_um >= FILM_LEAST_WAVE_GRAIN_UM && film->grain_um <= FILM_MOST_WAVE_GRAIN_UM),
          "surfaces that are rendered by waves have grains of 4 to 128 um"},
+        {"roughness", false, film_has_waves(&m) && !film_waves_are_low(&w),
+         "with these grains the surface would be higher than 10 um, too rough for waves"},
         {"roughness", false, !smooth && film->roughness > FILM_MOST_SLOPE,
          "facets that are seen one by one have a roughness of at most 0.5"},
     };

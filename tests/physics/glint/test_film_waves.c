@@ -22,13 +22,13 @@ static const struct film_groups sheet_film = {
     0, 1, {{.color = {1, 1, 1}, .roughness = 0.2f, .grain_um = 10, .surface = FILM_NOISE, .optics = FILM_R_GHS}}};
 
 /* One film along x that is a quarter wider than the tile. */
-static struct scene *sheet(void)
+static struct scene *sheet(const struct film_groups *films)
 {
     static const double y_z[1][2] = {{50e-6, 0}};
     struct fiber_set f;
     struct scene *scene = NULL;
     struct error err = {0};
-    const struct scene_option o = {.films = &sheet_film};
+    const struct scene_option o = {.films = films};
     hand_straight(&f, 1, y_z, 100e-6, 62.5e-6 / 8);
     assert_int_equal(fiber_set_add_shapes(&f, NULL), STATUS_OK);
     for (size_t k = 0; k < f.n_vertex; k++) {
@@ -78,7 +78,7 @@ static void test_a_sheet_has_the_mean_of_its_map(void **state)
 {
     (void)state;
     enum { N_PX = 64 };
-    struct scene *scene = sheet();
+    struct scene *scene = sheet(&sheet_film);
     struct appearance model;
     struct configuration c = {.light_theta_rad = 20 * RAD_PER_DEG,
                               .light_phi_rad = 20 * RAD_PER_DEG,
@@ -117,6 +117,28 @@ static void test_a_sheet_has_the_mean_of_its_map(void **state)
     scene_free(scene);
 }
 
+/* The highest waves of the coarsest grains that documents may have can be made. */
+static void test_the_highest_waves(void **state)
+{
+    (void)state;
+    static const uint32_t surface[] = {FILM_NOISE, FILM_SCRATCHES};
+    for (size_t i = 0; i < sizeof surface / sizeof *surface; i++) {
+        struct film_groups films = sheet_film;
+        struct film_material *m = films.material;
+        struct film_waves w;
+        struct error err = {0};
+        m->surface = surface[i];
+        m->grain_um = (float)FILM_MOST_WAVE_GRAIN_UM;
+        m->roughness = 0.05f;
+        for (film_waves_of(m, &w); film_waves_are_low(&w); film_waves_of(m, &w)) m->roughness += 0.002f;
+        assert_true(m->roughness < (float)FILM_MOST_SLOPE);
+        m->roughness -= 0.002f;
+        struct scene *scene = sheet(&films);
+        if (scene_glints_make(scene, &err) != STATUS_OK) fail_msg("surface %u: %s", m->surface, err.text);
+        scene_free(scene);
+    }
+}
+
 static void test_options_are_the_models(void **state)
 {
     (void)state;
@@ -133,6 +155,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_a_sheet_has_the_mean_of_its_map),
+        cmocka_unit_test(test_the_highest_waves),
         cmocka_unit_test(test_options_are_the_models),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

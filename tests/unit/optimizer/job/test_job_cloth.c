@@ -222,6 +222,9 @@ static void test_what_would_have_no_effect(void **state)
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"film_width_um\":90,\"film_surface\":\"noise\","
                                    "\"film_optics\":\"ohs\",\"film_grain_um\":129}]"),
                              "cloth.yarns[0].film_grain_um", "4 to 128");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"yarns\":[{\"film_width_um\":90,\"film_surface\":\"noise\","
+                                   "\"film_optics\":\"ohs\",\"film_grain_um\":100,\"film_roughness\":0.21}]"),
+                             "cloth.yarns[0].film_roughness", "higher than 10 um");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"sequin_diameter_um\":3000,\"sequin_surface\":\"flakes\","
                                    "\"sequin_roughness\":0.6"),
                              "cloth.sequin_roughness", "at most 0.5");
