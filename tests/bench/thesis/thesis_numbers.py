@@ -100,9 +100,9 @@ def tint(rgb):
 
 
 def silk_cyan(found):
-    """Red over the mean of green and blue at (80, 80) over the same at (20, 20), lamp and camera in one plane, both rotations."""
+    """Red over the mean of green and blue at (20, 20) and (80, 80), lamp and camera in one plane, both rotations."""
     rows = found["silk rows"]
-    return MISSING if not rows else listed([tint(rows[f"f{4 * r}"][0]) / tint(rows[f"f{4 * r + 1}"][0]) for r in (0, 1)])
+    return MISSING if not rows else "; ".join(listed([tint(rows[f"f{4 * r + k}"][0]) for r in (0, 1)]) for k in (1, 0))
 
 
 def radii():
