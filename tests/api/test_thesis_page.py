@@ -65,7 +65,7 @@ def test_a_whole_page_has_every_number(found, tmp_path):
     assert "0.50, 0.25; 0.25, 0.12" not in page and "0.50, 0.50; 0.25, 0.25" in row_of(page, "figure 5.8")[0]
     assert "3.00 times" in row_of(page, "figure 5.17")[0] and "microflakes 1.50" in row_of(page, "figure 5.17")[0]
     assert "dual 1.50" in row_of(page, "table 6.2")[1] and "1,234, 1,234, 1,234" in row_of(page, "table 6.1")[0]
-    assert "fibers -8, -3, -1; volume -8, -3, -1" in row_of(page, "figure 5.16")[0]
+    assert "fibers 8, 3, 1; volume 8, 3, 1" in row_of(page, "figure 5.16")[0]
 
 
 def test_a_page_without_results_is_written(found, tmp_path):
@@ -85,6 +85,15 @@ def test_values_that_are_off_or_not_determined_are_marked(found, tmp_path):
     line = row_of(page_of(other, tmp_path), "Silk, fibers")[0]
     assert "0.620 0.553 0.562: 0.633* 0.553 0.562" in line and "10.00: (10.90)" in line and "19.82: 20.20 |" in line
     assert line.count("*") == 1
+
+
+def test_noise_of_a_cylinder_is_stated(found):
+    """One column of 16 has an error of 3 in each channel: 3 sqrt(3) over 3 x (15 + 2)."""
+    assert thesis_page.ratio_text(thesis_page.over_true(found, "silk", "volume")[0]) == "0.80"
+    noisy = copy.deepcopy(found)
+    noisy["shapes", "silk", "volume"]["columns"][0][5][3:] = [3.0] * 3
+    assert thesis_page.ratio_text(thesis_page.over_true(noisy, "silk", "volume")[0]) == "0.80 +- 0.10"
+    assert thesis_page.ratio_text(None) == "-"
 
 
 def test_edges_and_tint():

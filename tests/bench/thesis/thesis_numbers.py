@@ -64,9 +64,9 @@ def scatter_table(found):
 
 
 def brightest_mm(columns):
-    """Place of the brightest of a cylinder's columns."""
+    """Distance of the brightest of a cylinder's columns from the axis."""
     level = [sum(bin_[:3]) for bin_ in columns]
-    return ((level.index(max(level)) + 0.5) / BINS * 2 - 1) * SEEN_MM
+    return abs((level.index(max(level)) + 0.5) / BINS * 2 - 1) * SEEN_MM
 
 
 def velvet_peak(found):
@@ -86,12 +86,12 @@ def edge_ratio(columns):
 
 
 def twill_edges(found):
-    """At 10, 50 and 90 degrees, by each model that is there."""
+    """At 10 and 50 degrees, by each model that is there."""
     parts = []
     for model, name in (("photograph", "fibers"), ("volume", "volume"), ("microflake", "microflakes")):
         shown = found["shapes", "twill", model]
         if shown:
-            parts.append(f"{name} {listed([edge_ratio(shown['columns'][ANGLES.index(a)]) for a in (10, 50, 90)])}")
+            parts.append(f"{name} {listed([edge_ratio(shown['columns'][ANGLES.index(a)]) for a in (10, 50)])}")
     return "; ".join(parts) or MISSING
 
 

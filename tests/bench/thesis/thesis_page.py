@@ -43,13 +43,25 @@ def brightness(columns):
     return sum(sum(bin_[:3]) for bin_ in columns)
 
 
+def brightness_error(columns):
+    return math.sqrt(sum(se * se for bin_ in columns for se in bin_[3:]))
+
+
 def over_true(found, fabric, model):
-    """Mean radiances over the true ones: five cylinders, then the two drapes with the black mesh."""
+    """Mean radiances over the true ones with their errors by tracing: five cylinders, then the two drapes with the black mesh (no error known)."""
     shown, true = found["shapes", fabric, model], found["shapes", fabric, "photograph"]
     if shown is None or true is None:
         return [None] * (len(ANGLES) + len(SIDE))
-    return ([brightness(a) / brightness(b) for a, b in zip(shown["columns"], true["columns"])]
-            + [a / b for a, b in zip(shown["drapes"][:2], true["drapes"][:2])])
+
+    def over(a, b):
+        value = brightness(a) / brightness(b)
+        return value, value * math.hypot(*(brightness_error(of) / brightness(of) for of in (a, b)))
+    return [over(a, b) for a, b in zip(shown["columns"], true["columns"])] + [(a / b, 0) for a, b in zip(shown["drapes"][:2], true["drapes"][:2])]
+
+
+def ratio_text(value):
+    """With its error where that is 5 % and 0.015 or more."""
+    return MISSING if value is None else f"{value[0]:.2f}" + (f" +- {value[1]:.2f}" if value[1] >= max(0.05 * value[0], 0.015) else "")
 
 
 def grazing(found):
@@ -58,10 +70,10 @@ def grazing(found):
     for fabric in NAMES:
         for model, name in (("volume", "volume"), ("microflake", "microflakes")):
             cross = found[fabric, model, "cross"]
-            row = [sum(cross["grazing"]) / 2 if cross else None] + over_true(found, fabric, model)
+            row = [(sum(cross["grazing"]) / 2, 0) if cross else None] + over_true(found, fabric, model)
             if all(v is None for v in row):
                 continue
-            lines.append(f"| {fabric.capitalize()}, {name} | " + " | ".join(MISSING if v is None else f"{v:.2f}" for v in row) + " |")
+            lines.append(f"| {fabric.capitalize()}, {name} | " + " | ".join(map(ratio_text, row)) + " |")
     return "\n".join(lines)
 
 
