@@ -2,6 +2,7 @@
 import copy
 import os
 import re
+import struct
 import sys
 import xml.etree.ElementTree as ElementTree
 
@@ -43,6 +44,7 @@ def found():
     f.update({("seconds", "path"): 6.0, ("seconds", "dual"): 4.0, "silk rows": {f"f{i}": [[0.6, 0.2, 0.2], [0, 0, 0]] for i in range(16)}})
     f.update({("thin", d): [d / 4000, d / 8000] for d in thesis_fits.DENSITIES})
     f.update({("tables", fabric): [100.0, 4000000, 1234] for fabric in thesis_looks.TABLE_FABRICS})
+    f.update({("unseen", e): 0.5 for e in thesis_pictures.CELL_PATHS})
     f.update({("mesh", fabric, sheet): None for fabric in thesis_looks.MESH_FABRICS for sheet in (True, False)})
     return f
 
@@ -94,6 +96,17 @@ def test_noise_of_a_cylinder_is_stated(found):
     noisy["shapes", "silk", "volume"]["columns"][0][5][3:] = [3.0] * 3
     assert thesis_page.ratio_text(thesis_page.over_true(noisy, "silk", "volume")[0]) == "0.80 +- 0.10"
     assert thesis_page.ratio_text(None) == "-"
+
+
+def test_fibers_in_cells_that_nobody_sees(tmp_path):
+    """Two cells deep, of a tile of 2 x 1 mm in two columns: the lower one on the left has no row. A fiber of 0.8 mm lies in it, one of
+    0.8 mm above it, and one of 0.4 mm, beyond the right face, below on the right."""
+    head = struct.pack("<8s2IQ5d6I", b"SELVFAST", 6, 168, 0, 2.0, 1.0, -1.0, 0.1, 0.1, 4, 1, 1, 2, 1, 2)
+    cells = struct.pack("<4I", 0, 1, 0xFFFFFFFF, 2)
+    (tmp_path / "t").write_bytes(head + bytes(168 - len(head)) + cells)
+    fibers = [[(0.1, 0.5, -0.7, 0.1), (0.9, 0.5, -0.7, 0.1)], [(0.1, 0.5, -0.1, 0.1), (0.9, 0.5, -0.1, 0.1)],
+              [(-0.9, 0.5, -0.7, 0.1), (-0.5, 0.5, -0.7, 0.1)]]
+    assert thesis_looks.unseen_share(tmp_path / "t", fibers) == pytest.approx(0.4)
 
 
 def test_edges_and_tint():

@@ -1,11 +1,15 @@
 """Pictures and tables of the page of bench_thesis.py that need jobs of their own: drapes of three densities (figure 5.8), drapes with and without a
 black mesh for the eye (figure 5.18), and mean free paths (table 6.1); and the two pictures of the page.
 """
+import math
 import os
 import struct
 
 from thesis_fabrics import NAMES, truth
 from thesis_pictures import ANGLES, BINS, DRAPE, SEEN_MM, SIDE, document
+
+from fiber_file import Fibers  # thesis_pictures leads to tests/support/python
+from small_exr import read_exr
 
 MESH_FABRICS, TABLE_FABRICS = ("gabardine", "twill"), ("fleece", "gabardine", "silk")
 MESH_PX = 160
@@ -53,6 +57,33 @@ def tables(steps, fabric):
     return found and found + [whole and whole["geometry"]["n_fiber"]]
 
 
+def unseen_share(tables_path, fibers):
+    """Share of the length of fibers that lies in cells without a row of transfer (renderer/fast/NOTES.md)."""
+    with open(tables_path, "rb") as f:
+        data = f.read()
+    tile_x, tile_y, lowest = struct.unpack_from("<3d", data, 24)
+    n_x, n_y, n_z = struct.unpack_from("<3I", data, 76)
+    cell = struct.unpack_from(f"<{n_x * n_y * n_z}I", data, 168)
+    top = max(z + radius for fiber in fibers for _, _, z, radius in fiber)
+    length = unseen = 0.0
+    for fiber in fibers:
+        for a, b in zip(fiber, fiber[1:]):
+            x, y, z = ((p + q) / 2 for p, q in zip(a[:3], b[:3]))
+            at = [int(n * share) % n for n, share in ((n_x, x / tile_x % 1), (n_y, y / tile_y % 1))]
+            down = min(int(n_z * max(top - z, 0) / -lowest), n_z - 1)
+            step = math.dist(a[:3], b[:3])
+            length += step
+            unseen += step * (cell[(down * n_y + at[1]) * n_x + at[0]] == 0xFFFFFFFF)
+    return unseen / length
+
+
+def unseen(steps, name):
+    """Of a step of pictures by cells whose folder is there; None: it is not."""
+    folder = os.path.join(steps.folder, name)
+    paths = os.path.join(folder, "work", "report", "fast.tables"), os.path.join(folder, "results", "fibers.hair")
+    return unseen_share(paths[0], Fibers.read(paths[1]).fibers) if all(map(os.path.exists, paths)) else None
+
+
 # ---- the pictures ----
 
 WIDTH, HEIGHT, LEFT, TOP, GAP = 150, 70, 70, 24, 8
@@ -96,7 +127,6 @@ def draw_drapes(found, path):
     """Figure 5.18: columns are Gabardine with and without the mesh, then Twill; one exposure for a fabric's four pictures."""
     import numpy as np
     from PIL import Image
-    from small_exr import read_exr
     columns = []
     for fabric in MESH_FABRICS:
         both = [found["mesh", fabric, sheet] for sheet in (True, False)]

@@ -2,7 +2,7 @@
 from thesis_fabrics import MODELS, NAMES, cloth
 from thesis_fits import DENSITIES
 from thesis_looks import TABLE_FABRICS
-from thesis_pictures import ANGLES, BINS, SEEN_MM
+from thesis_pictures import ANGLES, BINS, CELL_PATHS, SEEN_MM
 
 MISSING = "-"
 NAME = {"two_lobe": "fibers", "volume": "volume", "microflake": "microflakes"}
@@ -114,6 +114,7 @@ def chapter6(found):
     heads = [found["tables", fabric] for fabric in TABLE_FABRICS]
     seconds = [found["seconds", name] for name in ("path", "dual")]
     return {"free_paths": listed([h and h[0] for h in heads], "{:.0f}"), "n_fibers": listed([h and h[2] for h in heads], "{:,}"),
+            "unseen": listed([found["unseen", e] and 100 * found["unseen", e] for e in CELL_PATHS], "{:.0f}"),
             "dual_speed": f"{seconds[0] / seconds[1]:.2f}" if all(seconds) else MISSING}
 
 
