@@ -59,7 +59,7 @@ bench-model-tables: | deps-test ## all models fitted to the measured tables, on 
 	@/usr/bin/python3 tests/bench/models/bench_model_tables.py --build $(BUILD) $(if $(TABLES),--tables $(TABLES)) $(FABRICS)
 
 # THESIS: beginnings of names of steps, such as THESIS="fit.silk cross.silk": only these are made. What is finished is kept in build/bench-thesis
-bench-thesis: | deps-test ## chapters 5 and 6 of the fabric thesis: six fabrics by three models, cylinders, drapes, steps left out; writes docs/thesis.md (two hours on 2 quiet cores; continues when stopped)
+bench-thesis: | deps-test ## chapters 5 and 6 of the fabric thesis: six fabrics by three models, cylinders, drapes, steps left out; writes docs/thesis.md (75 minutes on 2 shared cores; continues when stopped)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/thesis/bench_thesis.py --build $(BUILD) --page docs/thesis.md $(THESIS)
 
