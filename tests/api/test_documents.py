@@ -120,16 +120,6 @@ def source_rows():
                 yield from ([cell.strip() for cell in row.strip("|").split("|")] for row in table.splitlines())
 
 
-def test_every_place_has_a_test_or_a_command():
-    rows = list(source_rows())
-    assert len(rows) > 40
-    names = {os.path.splitext(name)[0] for _, _, files in os.walk(os.path.join(ROOT, "tests")) for name in files}
-    for row in rows:
-        shown = re.findall(r"`(?:make )?([\w-]+)[^`]*`", row[-1])
-        assert shown, row
-        assert not [name for name in shown if name.startswith("test_") and name not in names], row
-
-
 def test_source_table_has_every_place():
     found = {place for row in source_rows() for place in places_of(row[0])}
     wanted = {("", f"{series}.{number}") for series, most in SOURCE_SECTIONS.items() for number in range(1, most + 1)}

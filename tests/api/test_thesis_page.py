@@ -45,7 +45,7 @@ def found():
     f.update({("thin", d): [d / 4000, d / 8000] for d in thesis_fits.DENSITIES})
     f.update({("tables", fabric): [100.0, 4000000, 1234] for fabric in thesis_looks.TABLE_FABRICS})
     f.update({("unseen", e): 0.5 for e in thesis_pictures.CELL_PATHS})
-    f.update({("mesh", fabric): None for fabric in thesis_looks.MESH_FABRICS})
+    f.update({("mesh", fabric, sheet): None for fabric in thesis_looks.MESH_FABRICS for sheet in (True, False)})
     return f
 
 

@@ -23,7 +23,7 @@ def test_configurations_are_as_many_as_printed():
 
 
 def test_table_lies_in_the_ranges():
-    """54 sets of Table 5.3: colors count as three."""
+    """150 values of Table 5.3: colors count as three."""
     said = subprocess.run([os.path.join(BUILD, "bin", "selvedge-worker"), "--catalogue"], check=True, capture_output=True, text=True)
     models = {m["id"]: {p["name"]: p for p in m["parameters"]} for m in json.loads(said.stdout)["models"]}
     for model, model_id in thesis_fabrics.MODELS.items():

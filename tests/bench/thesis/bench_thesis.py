@@ -64,7 +64,7 @@ def pictures(steps):
 def looks(steps):
     found = {("thin", d): thesis_looks.thin(steps, d) for d in thesis_fits.DENSITIES}
     found.update({("tables", fabric): thesis_looks.tables(steps, fabric) for fabric in thesis_looks.TABLE_FABRICS})
-    found.update({("mesh", fabric): thesis_looks.mesh(steps, fabric) for fabric in thesis_looks.MESH_FABRICS})
+    found.update({("mesh", fabric, sheet): thesis_looks.mesh(steps, fabric, sheet) for fabric in thesis_looks.MESH_FABRICS for sheet in (True, False)})
     found.update({("unseen", e): thesis_looks.unseen(steps, f"fast.size-{e}") for e in thesis_pictures.CELL_PATHS})
     rows = steps.kept("truth.silk.two_lobe.f")
     found["silk rows"] = rows and rows["value"]

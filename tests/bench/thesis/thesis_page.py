@@ -65,15 +65,15 @@ def ratio_text(value):
 
 
 def grazing(found):
+    """A cell has volumes, then microflakes."""
     head = [f"{a}°" for a in ANGLES] + ["drape, same side", "opposite"]
     lines = [f"| | grazing | {' | '.join(head)} |", "|---|" + "---|" * (len(head) + 1)]
     for fabric in NAMES:
-        for model, name in (("volume", "volume"), ("microflake", "microflakes")):
+        rows = []
+        for model in ("volume", "microflake"):
             cross = found[fabric, model, "cross"]
-            row = [(sum(cross["grazing"]) / 2, 0) if cross else None] + over_true(found, fabric, model)
-            if all(v is None for v in row):
-                continue
-            lines.append(f"| {fabric.capitalize()}, {name} | " + " | ".join(map(ratio_text, row)) + " |")
+            rows.append([(sum(cross["grazing"]) / 2, 0) if cross else None] + over_true(found, fabric, model))
+        lines.append(f"| {fabric.capitalize()} | " + " | ".join(f"{ratio_text(a)}; {ratio_text(b)}" for a, b in zip(*rows)) + " |")
     return "\n".join(lines)
 
 
