@@ -15,7 +15,9 @@
  *       1.99 in steps of 0.01, with the turn known
  *   chapter4.fit_s               longest time of a fit
  *
- * bench_chapter4 [FIBERS]    the first so many (14)
+ * bench_chapter4 [FIBERS [KEPT]]    the first so many (14); KEPT: a file to which each fit adds a line, "mode fiber
+ *                                   error se turn turn_se published wall_s". Fits whose line it holds are not run
+ *                                   again.
  */
 #include "base/angle.h"
 #include "optimizer/fit/profile/profile_fit.h"
@@ -23,6 +25,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { N_FIBER = 14, N_PHI_I = 24, N_RAY = 4000, N_GRID = 100, C_T = 0, ETA = 3, RATIO, ALPHA, BETA, GAMMA, N_PARAM };
 static const char *const model_id = "elliptical_oriented.v1";
@@ -35,16 +38,21 @@ static const struct {
                    {"E1", 1.897, 1.56}, {"E2", 1.666, 1.99}, {"F1", 1.334, 1.07}, {"F2", 1.121, 1.00},
                    {"G1", 1.396, 1.26}, {"G2", 1.645, 1.81}};
 
-struct modes {
-    const char *name;
-    int of_rays;
-    double error2, pull2, turn2, published2, largest_se;
-};
-
 /* Predictions of the published grid for the modes, at the turn 0. */
 struct grid {
     size_t n;
-    double *value; /* N_GRID x n */
+    double *value; /* N_GRID x n; NULL: not needed yet, or all modes */
+};
+
+struct modes {
+    const char *name;
+    int of_rays;
+    double error2, pull2, turn2, published2, largest_se, longest_s;
+    struct grid grid;
+};
+
+struct outcome {
+    double error, se, turned, turn_se, published, wall_s; /* published: NAN of all modes */
 };
 
 static void fail(const struct error *err)
@@ -145,8 +153,7 @@ static void fit(const struct modes *m, const struct section_fiber *truth, const 
     if (profile_fit_run(&problem, "of rays", out, &err) != STATUS_OK) fail(&err);
 }
 
-/* Fits one fiber; returns the time. */
-static double fit_fiber(struct modes *m, int k, const struct grid *g, struct thread_pool *pool)
+static struct outcome fit_fiber(struct modes *m, int k, struct thread_pool *pool)
 {
     const double turn = fmod(0.3 + 2.1 * k, M_PI);
     const struct section_fiber truth = fiber_of(hair[k].ratio, m->of_rays < 0, turn);
@@ -156,23 +163,59 @@ static double fit_fiber(struct modes *m, int k, const struct grid *g, struct thr
     section_rays_add(&truth, m->of_rays, N_RAY, &profile);
     section_rays_noise(&profile, (uint64_t)k + 1);
     fit(m, &truth, &profile, pool, &f);
-    const double error = f.param[RATIO] - truth.ratio, se = f.se_param[RATIO],
-                 left = g->n > 0 ? published_ratio(g, &profile) : NAN, turned = remainder(f.turn_rad - turn, M_PI);
+    if (m->of_rays >= 0 && m->grid.value == NULL) m->grid = grid_of(m, pool);
+    const struct outcome o = {.error = f.param[RATIO] - truth.ratio,
+                              .se = f.se_param[RATIO],
+                              .turned = remainder(f.turn_rad - turn, M_PI),
+                              .turn_se = f.turn_se_rad,
+                              .published = m->of_rays >= 0 ? published_ratio(&m->grid, &profile) - truth.ratio : NAN,
+                              .wall_s = f.wall_s};
     fprintf(stderr, "%-4s%-3s ratio %.3f: %.4f +- %.4f (%+.1f), turn %+.2f +- %.2f degrees, chi square %.2f", m->name,
-            hair[k].name, truth.ratio, f.param[RATIO], se, error / se, angle_to_deg(turned),
-            angle_to_deg(f.turn_se_rad), f.chi_square);
+            hair[k].name, truth.ratio, f.param[RATIO], o.se, o.error / o.se, angle_to_deg(o.turned),
+            angle_to_deg(o.turn_se), f.chi_square);
     fprintf(stderr, ", misfit %.3f, %zu of %zu starts, %zu evaluations, %.0f s", f.misfit, f.n_agree, f.n_start,
             f.n_evaluation, f.wall_s);
-    if (g->n > 0) fprintf(stderr, "; L1 %.2f", left);
+    if (m->of_rays >= 0) fprintf(stderr, "; L1 %.2f", truth.ratio + o.published);
     fprintf(stderr, "; published of the real fiber %.2f\n", hair[k].published);
-    m->error2 += error * error;
-    m->pull2 += pow(error / se, 2);
-    m->turn2 += pow(turned / f.turn_se_rad, 2);
-    m->published2 += pow(left - truth.ratio, 2);
-    m->largest_se = fmax(m->largest_se, se);
     profile_fit_release(&f);
     fiber_profile_release(&profile);
-    return f.wall_s;
+    return o;
+}
+
+/* Finds the outcome in the file, or fits and adds it. */
+static struct outcome kept_fiber(struct modes *m, int k, const char *path, struct thread_pool *pool)
+{
+    struct outcome o;
+    char mode[8], name[8], line[400];
+    FILE *file = path != NULL ? fopen(path, "r") : NULL;
+    while (file != NULL && fgets(line, sizeof line, file) != NULL)
+        if (sscanf(line, "%7s %7s %lf %lf %lf %lf %lf %lf", mode, name, &o.error, &o.se, &o.turned, &o.turn_se,
+                   &o.published, &o.wall_s) == 8 &&
+            strcmp(mode, m->name) == 0 && strcmp(name, hair[k].name) == 0) {
+            fclose(file);
+            return o;
+        }
+    if (file != NULL) fclose(file);
+    o = fit_fiber(m, k, pool);
+    if (path == NULL) return o;
+    if ((file = fopen(path, "a")) == NULL ||
+        fprintf(file, "%s %s %.8g %.8g %.8g %.8g %.8g %.4g\n", m->name, hair[k].name, o.error, o.se, o.turned,
+                o.turn_se, o.published, o.wall_s) < 0 ||
+        fclose(file) != 0) {
+        perror(path);
+        exit(1);
+    }
+    return o;
+}
+
+static void add(struct modes *m, const struct outcome *o)
+{
+    m->error2 += o->error * o->error;
+    m->pull2 += pow(o->error / o->se, 2);
+    m->turn2 += pow(o->turned / o->turn_se, 2);
+    m->published2 += pow(o->published, 2);
+    m->largest_se = fmax(m->largest_se, o->se);
+    m->longest_s = fmax(m->longest_s, o->wall_s);
 }
 
 static void print(const struct modes *m, const char *what, double value)
@@ -183,27 +226,29 @@ static void print(const struct modes *m, const char *what, double value)
 
 int main(int argc, char **argv)
 {
+    enum { N_MODES = 3 };
     const int n = argc > 1 ? (int)strtol(argv[1], NULL, 10) : N_FIBER;
-    struct modes list[] = {{.name = "TRT", .of_rays = 2}, {.name = "R", .of_rays = 0}, {.name = "all", .of_rays = -1}};
+    struct modes list[N_MODES] = {
+        {.name = "TRT", .of_rays = 2}, {.name = "R", .of_rays = 0}, {.name = "all", .of_rays = -1}};
     struct thread_pool *pool = NULL;
     double longest_s = 0;
     if (n < 1 || n > N_FIBER || thread_pool_new(0, &pool, NULL) != STATUS_OK) {
-        fprintf(stderr, "usage: bench_chapter4 [FIBERS], at most %d\n", N_FIBER);
+        fprintf(stderr, "usage: bench_chapter4 [FIBERS [KEPT]], at most %d fibers\n", N_FIBER);
         return 2;
     }
-    enum { N_MODES = sizeof list / sizeof *list };
-    struct grid g[N_MODES] = {{0, NULL}};
-    for (size_t i = 0; i < N_MODES; i++)
-        if (list[i].of_rays >= 0) g[i] = grid_of(&list[i], pool);
     for (int k = 0; k < n; k++)
-        for (size_t i = 0; i < N_MODES; i++) longest_s = fmax(longest_s, fit_fiber(&list[i], k, &g[i], pool));
+        for (size_t i = 0; i < N_MODES; i++) {
+            const struct outcome o = kept_fiber(&list[i], k, argc > 2 ? argv[2] : NULL, pool);
+            add(&list[i], &o);
+        }
     for (size_t i = 0; i < N_MODES; i++) {
         print(&list[i], "rms_error", sqrt(list[i].error2 / n));
         print(&list[i], "rms_pull", sqrt(list[i].pull2 / n));
         print(&list[i], "turn_pull", sqrt(list[i].turn2 / n));
         print(&list[i], "largest_se", list[i].largest_se);
-        if (g[i].n > 0) print(&list[i], "published_rms_error", sqrt(list[i].published2 / n));
-        free(g[i].value);
+        if (list[i].of_rays >= 0) print(&list[i], "published_rms_error", sqrt(list[i].published2 / n));
+        longest_s = fmax(longest_s, list[i].longest_s);
+        free(list[i].grid.value);
     }
     printf("{\"name\":\"chapter4.fit_s\",\"value\":%.4g,\"unit\":\"s\",\"better\":\"lower\"}\n", longest_s);
     thread_pool_free(pool);

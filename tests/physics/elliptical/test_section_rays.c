@@ -59,8 +59,53 @@ static void modes_of_a_turned_section(void **unused)
     }
 }
 
+/* Error of the ratio that a fit of R finds in rays without noise, over the error that it states for the noise of
+ * section_rays_noise, with the scale fitted beside the ratio. */
+static double pull_of_ratio(const struct section_fiber *f, const struct fiber_profile *rays)
+{
+    enum { N_PARAM = 8, RATIO = 4 };
+    const double param[N_PARAM] = {f->c_t, f->c_t, f->c_t, f->eta, f->ratio, f->alpha_rad, f->beta_rad, f->gamma_rad};
+    const struct profile_work work = {.turn_rad = f->turn_rad, .mode = 1};
+    double *value = calloc(rays->n, sizeof *value), *jac = calloc(rays->n * N_PARAM, sizeof *jac), most = 0;
+    double rr = 0, rs = 0, ss = 0, rd = 0, sd = 0; /* sums of products of r: the derivative, s: the scale's, d */
+    struct error err = {0};
+    assert_true(value != NULL && jac != NULL);
+    if (profile_model_predict(scattering_find("elliptical_oriented.v1"), param, rays, &work, value, jac, &err) !=
+        STATUS_OK)
+        fail_msg("%s", err.text);
+    for (size_t i = 0; i < rays->n; i++) most = fmax(most, rays->row[i].radiance[0]);
+    for (size_t i = 0; i < rays->n; i++) {
+        const double se = 0.03 * rays->row[i].radiance[0] + 0.01 * most, r = jac[i * N_PARAM + RATIO] / se,
+                     s = value[i] / se, d = (rays->row[i].radiance[0] - value[i]) / se;
+        rr += r * r, rs += r * s, ss += s * s, rd += r * d, sd += s * d;
+    }
+    free(value);
+    free(jac);
+    return (rd - rs / ss * sd) / sqrt(rr - rs * rs / ss);
+}
+
+/* The ratio of R alone is off by at most a fifth of its stated error, so it raises the mean square of normalised errors
+ * by 4 %. Before R had a closed form, and a mode alone no balance of all modes, it was off by 1.5 errors. */
+static void ratio_of_reflection(void **unused)
+{
+    static const double ratio[] = {1.2, 1.473, 1.9};
+    (void)unused;
+    for (size_t k = 0; k < sizeof ratio / sizeof *ratio; k++) {
+        const struct section_fiber truth = {
+            ratio[k], 1.55, 0.999, 2 * RAD_PER_DEG, 2 * RAD_PER_DEG, 5 * RAD_PER_DEG, 25 * RAD_PER_DEG};
+        struct fiber_profile rays;
+        section_rays_rows(N_PHI_I, 0, &rays);
+        section_rays_add(&truth, 0, 3 * N_RAY, &rays);
+        const double pull = pull_of_ratio(&truth, &rays);
+        print_message("ratio %.3f from R: off by %+.2f of its error\n", ratio[k], pull);
+        assert_true(fabs(pull) < 0.2);
+        fiber_profile_release(&rays);
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(modes_of_a_turned_section)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(modes_of_a_turned_section),
+                                       cmocka_unit_test(ratio_of_reflection)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

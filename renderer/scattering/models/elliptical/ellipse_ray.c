@@ -85,8 +85,7 @@ struct ellipse_wall ellipse_wall_at(const struct ellipse *e, double cos_theta)
     return (struct ellipse_wall){cos_theta, over(inside, constant(cos_theta)), over(e->eta, inside)};
 }
 
-/* Unpolarised reflectance for the cosine of the angle outside. */
-static struct dual fresnel(struct dual cos_out, struct dual eta)
+struct dual ellipse_reflectance(struct dual cos_out, struct dual eta)
 {
     struct dual sin2 = add(constant(1), -1, times(cos_out, cos_out));
     struct dual cos_in = root(add(constant(1), -1, over(sin2, times(eta, eta))));
@@ -113,7 +112,8 @@ void ellipse_follow(const struct ellipse *e, const struct ellipse_wall *w, const
                     struct ellipse_path *path)
 {
     struct dual gamma = entry->gamma, nu = entry->nu, i = turned(add(constant(entry->phi), -1, nu));
-    struct dual f = fresnel(times(constant(w->cos_theta), cosine(i)), e->eta), left = add(constant(1), -1, f);
+    struct dual f = ellipse_reflectance(times(constant(w->cos_theta), cosine(i)), e->eta),
+                left = add(constant(1), -1, f);
     struct dual sine_in = over(sine(i), w->index), length = constant(0);
     struct dual t = angle(sine_in, root(add(constant(1), -1, times(sine_in, sine_in))));
     struct dual way = add(add(nu, 1, t), 1, constant(M_PI));
@@ -132,7 +132,7 @@ void ellipse_follow(const struct ellipse *e, const struct ellipse_wall *w, const
         struct dual share = constant(0), azimuth = constant(nu.v - entry->phi);
         struct dual cos_out = cosine_outside(add(constant(1), -1, times(sine_out, sine_out)));
         if (cos_out.v > 0) { /* otherwise the reflection is total */
-            f = fresnel(times(constant(w->cos_theta), cos_out), e->eta);
+            f = ellipse_reflectance(times(constant(w->cos_theta), cos_out), e->eta);
             share = times(left, add(constant(1), -1, f));
             azimuth = add(add(nu, 1, angle(sine_out, cos_out)), -1, constant(entry->phi));
             left = times(left, f);

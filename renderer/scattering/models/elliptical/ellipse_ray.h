@@ -56,6 +56,8 @@ struct ellipse_wall ellipse_wall_at(const struct ellipse *e, double cos_theta);
 void ellipse_follow(const struct ellipse *e, const struct ellipse_wall *w, const struct ellipse_entry *entry,
                     struct ellipse_path *path);
 
+/* Unpolarised reflectance by the cosine of the angle outside, > 0. */
+struct dual ellipse_reflectance(struct dual cos_out, struct dual eta);
 /* Cosine of the angle outside from its square, which is negative where the reflection is total, and its slope when
  * wanted. The root has an infinite slope at 0, so the derivatives of a sum over rays would be noisy. Between -G and G,
  * the square of the cosine of 77 degrees, root(G) (2 t^3 - t^5) takes its place, t = (square / G + 1) / 2. It has value

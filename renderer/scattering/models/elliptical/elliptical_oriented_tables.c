@@ -1,8 +1,10 @@
 /* Tables of elliptical_oriented.v1: rays are spread over a quarter of the plane of psi and Delta by quadratic
  * B-splines, and the sums are blurred as cosine series in both. The factors of the series remove the blur of the
- * B-splines, and, in the tables that are read by straight lines, also the blur of the straight lines. */
+ * B-splines, and, in the tables that are read by straight lines, also the blur of the straight lines. The series of R
+ * is known without rays (oriented_reflection.h). */
 #include "renderer/scattering/azimuth_table.h"
 #include "renderer/scattering/models/elliptical/elliptical_oriented.h"
+#include "renderer/scattering/models/elliptical/oriented_reflection.h"
 #include "renderer/scattering/quadratic_spline.h"
 
 #include <stdlib.h>
@@ -23,21 +25,23 @@ struct work {
     double cosine[N + 1][N + 1];
     double factor[N_LOBE][2][2][N + 1]; /* of waves: for the tables or clear; and by gamma */
     int n_wave[N_LOBE];
+    reflection_wave by_psi; /* of R */
     struct ellipse_entry entry[ORIENTED_N_RAY];
     struct dual weight[ORIENTED_N_RAY]; /* sum 1 */
 };
 
 static double sinc(double x) { return x > 0 ? sin(x) / x : 1; }
 
-/* exp(-k^2 w^2 / 2), w = sqrt(p + 1) gamma, in both directions, over the blur of B-splines (sinc^3) and of straight
- * lines (sinc^2). */
+/* exp(-k^2 w^2 / 2), w = sqrt(p + 1) gamma, in both directions, over the blur of B-splines (sinc^3; not of R) and of
+ * straight lines (sinc^2). */
 static void set_factors(struct work *w, double gamma)
 {
     for (int p = 0; p < N_LOBE; p++) {
         const double square = (p + 1) * gamma * gamma;
         w->n_wave[p] = (int)fmin(N, LEAST_FACTOR / sqrt(square) + 1) + 1;
         for (int k = 0; k <= N; k++) {
-            const double s = sinc(0.5 * M_PI * k / N), f = exp(-0.5 * k * k * square) / (s * s * s) * (k > 0 ? 2 : 1);
+            const double s = sinc(0.5 * M_PI * k / N), spread = p > 0 ? s * s * s : 1,
+                         f = exp(-0.5 * k * k * square) / spread * (k > 0 ? 2 : 1);
             for (int lines = 0; lines < 2; lines++) {
                 w->factor[p][lines][0][k] = lines ? f / (s * s) : f;
                 w->factor[p][lines][1][k] = -(double)k * k * (p + 1) * gamma * w->factor[p][lines][0][k];
@@ -121,6 +125,7 @@ static void add_rays(struct work *w, const struct ellipse *e, const double *para
             if (!(share.v > 0)) continue;
             energies[mode].v += share.v;
             for (int k = 0; k < 2; k++) energies[mode].d[k] += share.d[k];
+            if (p == 0) continue;
             for (int c = 0; c < 3; c++)
                 elliptical_absorbed(share, path.length[p], param[ELLIPTICAL_P_C_T + c], a + c * N_SUM);
             a[CLEAR] = share.v;
@@ -164,18 +169,44 @@ static void from_waves(struct work *w, oriented_plane wave, int n, const double 
             for (int j = 0; j <= N; j++) out[i][j] += w->cosine[k][i] * half[k][j];
 }
 
-/* Blurs a plane; by_gamma too unless NULL. lines: for tables that are read by straight lines. */
-static void blur(struct work *w, int p, int lines, oriented_plane plane, oriented_plane out, double (*by_gamma)[N + 1])
+/* Blurs a plane, given as waves; by_gamma too unless NULL. lines: for tables that are read by straight lines. */
+static void blur_waves(struct work *w, int p, int lines, oriented_plane wave, oriented_plane out,
+                       double (*by_gamma)[N + 1])
 {
-    oriented_plane wave;
     const double *f = w->factor[p][lines][0], *d = w->factor[p][lines][1];
-    to_waves(w, plane, w->n_wave[p], wave);
     memset(out, 0, sizeof(oriented_plane));
     from_waves(w, wave, w->n_wave[p], f, f, out);
     if (by_gamma == NULL) return;
     memset(by_gamma, 0, sizeof(oriented_plane));
     from_waves(w, wave, w->n_wave[p], d, f, by_gamma);
     from_waves(w, wave, w->n_wave[p], f, d, by_gamma);
+}
+
+static void blur(struct work *w, int p, int lines, oriented_plane plane, oriented_plane out, double (*by_gamma)[N + 1])
+{
+    oriented_plane wave;
+    to_waves(w, plane, w->n_wave[p], wave);
+    blur_waves(w, p, lines, wave, out, by_gamma);
+}
+
+/* R, which has no color: its value and its derivatives by eta, the ratio and gamma. */
+static void blur_reflection(struct work *w, double eta, double cosine)
+{
+    reflection_wave by_delta;
+    oriented_plane wave, *table = w->blurred[0][0];
+    oriented_reflection_delta(eta, fmax(cosine, LEAST_COSINE), by_delta);
+    for (int q = ORIENTED_VALUE; q <= ORIENTED_BY_RATIO; q++) {
+        const double *psi = w->by_psi[q == ORIENTED_BY_RATIO ? REFLECTION_SLOPE : REFLECTION_VALUE],
+                     *delta = by_delta[q == ORIENTED_BY_ETA ? REFLECTION_SLOPE : REFLECTION_VALUE];
+        const bool value = q == ORIENTED_VALUE;
+        for (int k = 0; k <= N; k++)
+            for (int l = 0; l <= N; l++) wave[k][l] = psi[k] * delta[l];
+        blur_waves(w, 0, 1, wave, table[value ? 0 : 1 + ELLIPTICAL_D_ETA + q - ORIENTED_BY_ETA],
+                   value ? table[1 + ELLIPTICAL_D_GAMMA] : NULL);
+        blur_waves(w, 0, 0, wave, w->clear[0][q], value ? w->clear[0][ORIENTED_BY_GAMMA] : NULL);
+    }
+    memset(table[1 + ELLIPTICAL_D_C_T], 0, sizeof(oriented_plane));
+    for (int c = 1; c < 3; c++) memcpy(w->blurred[0][c], table, sizeof w->blurred[0][c]);
 }
 
 /* A function of an azimuth at half a node: index in half steps of it. */
@@ -213,7 +244,7 @@ static void spread_rest(const double *value, double (*d)[N_TURN + 1], int n_d, o
 
 static void blur_all(struct work *w)
 {
-    for (int p = 0; p < N_LOBE; p++) {
+    for (int p = 1; p < N_LOBE; p++) {
         for (int c = 0; c < 3; c++) {
             oriented_plane *from = w->sum[p] + c * N_SUM;
             oriented_plane *to = w->blurred[p][c];
@@ -281,7 +312,9 @@ static void fill_row(void *context, size_t i, size_t i_thread)
 {
     const struct rows *r = context;
     struct work *w = &r->work[i_thread];
-    add_rays(w, r->e, r->param, (double)i / ELLIPTICAL_N_ROW, r->energies->share[i]);
+    const double cosine = (double)i / ELLIPTICAL_N_ROW;
+    add_rays(w, r->e, r->param, cosine, r->energies->share[i]);
+    blur_reflection(w, r->param[ELLIPTICAL_P_ETA], cosine);
     blur_all(w);
     store(w, r->s->cell[i], r->s->slope[i], &r->row[i]);
     for (int k = 0; k <= N_TURN; k++) store_view(r->s->cell[i], k, &r->s->view[i][k]);
@@ -297,6 +330,7 @@ status oriented_tables(struct scattering_state *s, const double *param, struct t
     struct rows rows = {s, &e, param, row, energies, w};
     set_factors(w, param[ELLIPTICAL_P_GAMMA]);
     enter_rays(w, &e);
+    oriented_reflection_psi(param[ELLIPTICAL_P_RATIO], w->by_psi);
     for (size_t i = 1; i < n_thread; i++) w[i] = w[0];
     memset(energies, 0, sizeof *energies);
     const status st = thread_pool_run(pool, ELLIPTICAL_N_ROW + 1, fill_row, &rows, NULL);

@@ -133,35 +133,40 @@ static void ratio_and_turn(void **unused)
     profile_fit_release(&fit);
 }
 
-/* Modes alone add up to all of them, values and derivatives, and the derivative by the turn is that of the values: the
- * two differences, over 0.5 and 1 degree on each side, differ by what lobes of 3.5 degrees bend, 4 % of the largest. */
+/* Modes alone add up to all of them but for the scales that balance the modes, which are at most 6 % from 1 in each
+ * direction. The derivative of R, which has a closed form, by the ratio is that of its values: a difference over 0.01
+ * misses it by their third derivative, (0.005 / 1.4)^2. The derivative by the turn is that of the values: the two
+ * differences, over 0.5 and 1 degree on each side, differ by what lobes of 3.5 degrees bend, 4 % of the largest. */
 static void modes_and_derivatives(void **unused)
 {
     (void)unused;
     struct turn_case f;
-    static double all[N_ROW], one[N_ROW], jac[N_ROW * N_ELLIPTICAL], part[N_ROW * N_ELLIPTICAL], sum[N_ROW],
-        by_ratio[N_ROW], by_turn[N_ROW], moved[2][N_ROW];
-    double top = 0, steepest = 0;
+    static double all[N_ROW], one[N_ROW], part[N_ROW * N_ELLIPTICAL], sum[N_ROW], by_turn[N_ROW], moved[2][N_ROW];
+    double top = 0, steepest = 0, top_slope = 0;
     begin(&f, "elliptical_oriented.v1");
     f.truth[RATIO] = 1.4;
-    predict(&f, &(struct profile_work){.turn_rad = turn_rad, .by_turn = by_turn}, all, jac);
+    predict(&f, &(struct profile_work){.turn_rad = turn_rad, .by_turn = by_turn}, all, NULL);
     for (size_t k = 0; f.model->mode[k] != NULL; k++) {
-        predict(&f, &(struct profile_work){.turn_rad = turn_rad, .mode = k + 1}, one, part);
-        for (int i = 0; i < N_ROW; i++) {
-            sum[i] += one[i];
-            by_ratio[i] += part[i * N_ELLIPTICAL + RATIO];
-        }
+        predict(&f, &(struct profile_work){.turn_rad = turn_rad, .mode = k + 1}, one, NULL);
+        for (int i = 0; i < N_ROW; i++) sum[i] += one[i];
     }
     for (int k = 0; k < 2; k++)
         predict(&f, &(struct profile_work){.turn_rad = turn_rad + (2 * k - 1) * RAD_PER_DEG}, moved[k], NULL);
     for (int i = 0; i < N_ROW; i++) top = fmax(top, all[i]), steepest = fmax(steepest, fabs(by_turn[i]));
     for (int i = 0; i < N_ROW; i++) {
-        assert_true(fabs(sum[i] - all[i]) < 1e-5 * top);
-        assert_true(fabs(by_ratio[i] - jac[i * N_ELLIPTICAL + RATIO]) < 1e-4 * top);
+        assert_true(fabs(sum[i] - all[i]) < 0.12 * all[i]);
         assert_true(fabs((moved[1][i] - moved[0][i]) / (2 * RAD_PER_DEG) - by_turn[i]) < 0.04 * steepest);
     }
     predict(&f, &(struct profile_work){.turn_rad = turn_rad + M_PI}, one, NULL);
     for (int i = 0; i < N_ROW; i++) assert_true(fabs(one[i] - all[i]) < 1e-4 * top);
+    predict(&f, &(struct profile_work){.turn_rad = turn_rad, .mode = 1}, one, part);
+    for (int k = 0; k < 2; k++) {
+        f.truth[RATIO] = 1.4 + 0.01 * (k - 0.5);
+        predict(&f, &(struct profile_work){.turn_rad = turn_rad, .mode = 1}, moved[k], NULL);
+    }
+    for (int i = 0; i < N_ROW; i++) top_slope = fmax(top_slope, fabs(part[i * N_ELLIPTICAL + RATIO]));
+    for (int i = 0; i < N_ROW; i++)
+        assert_true(fabs((moved[1][i] - moved[0][i]) / 0.01 - part[i * N_ELLIPTICAL + RATIO]) < 1e-3 * top_slope);
 }
 
 static void note(void *context, size_t k, const double *value)
