@@ -75,7 +75,7 @@ bench-pile: | deps-test ## previews of velvets by dual scattering and by diffusi
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/pictures/bench_pile >&2
 	@$(BUILD)/tests/bench/pictures/bench_pile $(PILE)
 
-bench-sheared: | deps-test ## previews by sheared filtering: rays for equal errors against own rays and the axis-aligned filter, and time (two minutes of a core)
+bench-sheared: | deps-test ## previews by sheared filtering: rays and time for equal errors against own rays and other filters (two minutes of a core)
 	@$(MAKE) --no-print-directory $(BUILD)/tests/bench/pictures/bench_sheared >&2
 	@$(BUILD)/tests/bench/pictures/bench_sheared
 

@@ -6,9 +6,10 @@
  *   sheared.<effect>.raw_ratio   Folds: rays of pixels without a filter, and sheared.<effect>.axis_ratio of the
  *                                axis-aligned filter, for the error of four passes with 3 x 3 rays, over 9; the most
  *                                rays that were tried over 9 where they do not reach it.
- *   sheared.time_ratio_<effect>_<way>  Drape: processor seconds of a way (raw, axis, whole) over the seconds of the
- *                                four passes with 3 x 3 rays, at their error. Seconds count the rays and the filter of
- *                                one effect; where the error is not reached, with the most rays that were tried.
+ *   sheared.time_ratio_<cloth>_<effect>_<way>
+ *                                Processor seconds of a way (raw, axis, whole) over the seconds of the four passes with
+ *                                3 x 3 rays, at their error. Seconds count the rays and the filter of one effect; where
+ *                                the error is not reached, with the most rays that were tried.
  *   sheared.passes_speedup       Folds: processor seconds of the whole sum over the four passes, both for 4 x 4 rays of
  *                                the lamp.
  *
@@ -178,7 +179,7 @@ static void print_rays(struct measured m[N_WAY][N_EFFECT])
     }
 }
 
-static void print_times(struct measured m[N_WAY][N_EFFECT])
+static void print_times(const char *cloth, struct measured m[N_WAY][N_EFFECT])
 {
     for (int k = 0; k < N_EFFECT; k++)
         for (int w = 0; w < N_WAY - 1; w++) {
@@ -186,7 +187,7 @@ static void print_times(struct measured m[N_WAY][N_EFFECT])
             double rays, seconds;
             char name[64];
             reach(&m[w][k], passes->error, &rays, &seconds);
-            snprintf(name, sizeof name, "time_ratio_%s_%s", effect[k], way_name[w]);
+            snprintf(name, sizeof name, "time_ratio_%s_%s_%s", cloth, effect[k], way_name[w]);
             print(name, seconds / passes->seconds, "ratio", "higher");
         }
 }
@@ -229,7 +230,7 @@ int main(void)
         c.q.width = c.q.height = EDGE;
         if (!folds) drape(&c);
         measure_all(&c.q, folds ? "folds" : "drape", m);
-        if (!folds) print_times(m);
+        print_times(folds ? "folds" : "drape", m);
         proxy_cloth_release(&c);
     }
     print_rays(m);
