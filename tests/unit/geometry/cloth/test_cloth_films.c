@@ -2,6 +2,7 @@
  * a yarn that is a film alone lies flat in the cloth and goes on in the next tile; fibers are pushed out of films;
  * sequins are round and do not meet. */
 #include "geometry/cloth/cloth.h"
+#include "geometry/fibers/fiber_view.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -270,7 +271,7 @@ static void test_sequins(void **state)
     free(d);
 }
 
-/* Loops of a knit are as wide as those of a yarn of the film's width. */
+/* A film makes loops as wide as a yarn of its width. */
 static void test_knitted_film(void **state)
 {
     (void)state;
@@ -291,6 +292,36 @@ static void test_knitted_film(void **state)
     fiber_set_release(&yarn);
     fiber_set_release(&film);
     free(d);
+}
+
+/* A film 100 um wide along x, on a tile of 250 um, seen from above: flat, and turned by 60 degrees about its axis. */
+static void test_films_from_above(void **state)
+{
+    (void)state;
+    static const float turned[2][3] = {{0, 1, 0}, {0, 0.5f, 0.8660254f}};
+    for (int i = 0; i < 2; i++) {
+        struct fiber_set f;
+        size_t size[2];
+        uint8_t *grey = NULL;
+        double cover;
+        fiber_set_init(&f);
+        assert_int_equal(fiber_set_reserve(&f, 1, 2, NULL), STATUS_OK);
+        for (int a = 0; a < 2; a++) f.tile_size_m[a] = 250 * um;
+        f.first_vertex[1] = 2;
+        f.radius_m[0] = (float)(10 * um);
+        assert_int_equal(fiber_set_add_shapes(&f, NULL), STATUS_OK);
+        for (size_t k = 0; k < 2; k++) {
+            const float p[3] = {(float)(250 * um * (double)k), (float)(125 * um), 0};
+            memcpy(f.position_m + 3 * k, p, sizeof p);
+            memcpy(f.shape[k].long_axis, turned[i], sizeof turned[i]);
+            f.shape[k].ratio = 25; /* 50 by 2 um */
+        }
+        assert_int_equal(fiber_top_view(&f, um, size, &grey, &cover, NULL), STATUS_OK);
+        assert_true(fabs(cover - (i == 0 ? 0.4 : 0.2)) < 2.0 / 250);
+        if (i == 1) assert_true(grey[145 * 250 + 100] > grey[105 * 250 + 100]);
+        free(grey);
+        fiber_set_release(&f);
+    }
 }
 
 static void refuse(struct cloth_description *d, const char *field)
@@ -324,8 +355,12 @@ static void test_refused(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest test[] = {cmocka_unit_test(test_film_around_a_yarn), cmocka_unit_test(test_film_alone),
-                                      cmocka_unit_test(test_fibers_leave_films), cmocka_unit_test(test_sequins),
-                                      cmocka_unit_test(test_knitted_film),       cmocka_unit_test(test_refused)};
+    const struct CMUnitTest test[] = {cmocka_unit_test(test_film_around_a_yarn),
+                                      cmocka_unit_test(test_film_alone),
+                                      cmocka_unit_test(test_fibers_leave_films),
+                                      cmocka_unit_test(test_sequins),
+                                      cmocka_unit_test(test_knitted_film),
+                                      cmocka_unit_test(test_films_from_above),
+                                      cmocka_unit_test(test_refused)};
     return cmocka_run_group_tests(test, NULL, NULL);
 }
