@@ -123,7 +123,7 @@ static void look_from(struct look *l, size_t k, const struct piece *piece, size_
     const struct strand_grid *g = l->c->grid;
     const struct grid_node *own = &g->sorted[k];
     const struct strand *t = &l->c->s->strand[own->strand];
-    if (t->fixed) return; /* it need not know what it pushes */
+    if (t->fixed) return; /* contacts do not move it */
     const double reach_m = own->radius_m + g->most_radius_m + 8.0 * g->rounding_m;
     const float x = g->at[0][k], y = g->at[1][k], z = g->at[2][k],
                 reach2 = strand_grid_is_narrow(g) ? INFINITY : (float)(reach_m * reach_m);

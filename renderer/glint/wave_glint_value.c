@@ -43,7 +43,7 @@ static status check(const struct wave_glint_option *o, struct error *err)
     return STATUS_OK;
 }
 
-/* Distance of kernels in texels: the largest one whose phase is that of the surface to the third order. */
+/* Distance of kernels in texels: the largest one at which phases of kernels agree with the surface. */
 static size_t stride_of(const struct wave_height *h, double coherence_um)
 {
     const double texel = (double)h->texel_um;

@@ -56,7 +56,7 @@ struct wave_direction {
  * psi . H'. trace, det: of K; across: b_u^2 K_vv - 2 b_u b_v K_uv + b_v^2 K_uu; third2: times xi_3^2. These are not
  * filled in for flat kernels. */
 struct wave_gathered {
-    size_t n; /* vectors, of which the last one may end with kernels of the weight 0 */
+    size_t n; /* vectors; the last one may end with kernels of the weight 0 */
     lanes path_um[WAVE_MOST_VECTOR], bend[WAVE_MOST_VECTOR], weight[WAVE_MOST_VECTOR], tilt[WAVE_MOST_VECTOR];
     lanes trace[WAVE_MOST_VECTOR], det[WAVE_MOST_VECTOR], across[WAVE_MOST_VECTOR], third2[WAVE_MOST_VECTOR];
 };
