@@ -35,7 +35,9 @@ def fits(steps):
             if own is not None:
                 figure(f"{fabric}.{model}.heldout", own["heldout"])
                 figure(f"{fabric}.{model}.ratio", own["ratio"])
-            cross = thesis_fits.fit(steps, fabric, model, "two_lobe") if model != "two_lobe" else None
+            if model == "two_lobe":
+                continue
+            cross = thesis_fits.fit(steps, fabric, model, "two_lobe")
             if cross is not None and found[fabric, "two_lobe"]:
                 # of the BRDF that has all 16 rows, while microflakes have 14
                 cross["ratio"] = cross["heldout"] / found[fabric, "two_lobe"]["brdf"]
