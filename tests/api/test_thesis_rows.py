@@ -48,6 +48,25 @@ def test_error_has_no_bias_by_noise():
     assert abs(mean - 0.01) < 4 * se and se < 0.005
 
 
+def test_a_folder_that_moved_keeps_its_steps(tmp_path):
+    """The key of a step with a file has the file's name in the folder; another file is another step."""
+    worker = tmp_path / "bin/selvedge-worker"
+    worker.parent.mkdir()
+    worker.write_text('#!/bin/sh\ncd $2\nmkdir -p results; echo "{\\"bytes\\": $(wc -c < input/scan)}" > results/result.json\n')
+    worker.chmod(0o755)
+
+    def job(folder, file):
+        steps = thesis_jobs.Steps(str(tmp_path), str(folder), [])
+        (folder / file).write_text(file)
+        return steps.job("chain.one", "d", {"scan": str(folder / file)}, lambda result, _: result["bytes"])
+    assert job(tmp_path / "steps", "a") == 1
+    os.rename(tmp_path / "steps", tmp_path / "moved")
+    worker.write_text("#!/bin/sh\nexit 1\n")
+    assert job(tmp_path / "moved", "a") == 1
+    with pytest.raises((RuntimeError, FileNotFoundError)):
+        job(tmp_path / "moved", "bb")
+
+
 def test_a_stopped_step_goes_on_and_an_old_program_is_told(tmp_path, capsys):
     """A worker in its place that fails at first, leaves a mark, and then writes down whether it found the mark."""
     worker = tmp_path / "bin/selvedge-worker"

@@ -16,6 +16,10 @@ import sys
 import time
 
 
+def is_path(content):
+    return len(content) < 4096 and os.path.exists(content)
+
+
 class Steps:
     def __init__(self, build, folder, names):
         self.worker = os.path.join(build, "bin", "selvedge-worker")
@@ -86,12 +90,16 @@ class Steps:
 
     def job(self, name, document, files, take):
         """take(result, folder of the results) gives what is kept."""
-        return self.step(name, [document, files], lambda: self.run(name, document, files, take))
+        return self.step(name, [document, self.described(files)], lambda: self.run(name, document, files, take))
+
+    def described(self, files):
+        """Contents, and paths as seen from the folder of the steps, which may have moved since."""
+        return {name: os.path.relpath(of, self.folder) if is_path(of) else of for name, of in files.items()}
 
     def run(self, name, document, files, take):
         """files: the content of each, or the path of one that is copied."""
         folder = os.path.join(self.folder, name)
-        text = json.dumps([document, files, self.program], sort_keys=True)
+        text = json.dumps([document, self.described(files), self.program], sort_keys=True)
         recipe = os.path.join(folder, "recipe.json")
         if os.path.exists(recipe):
             with open(recipe, encoding="utf-8") as f:
@@ -100,7 +108,7 @@ class Steps:
                 shutil.rmtree(folder)
         os.makedirs(os.path.join(folder, "input"), exist_ok=True)
         for file, content in files.items():
-            if len(content) < 4096 and os.path.exists(content):
+            if is_path(content):
                 shutil.copy(content, os.path.join(folder, "input", file))
                 continue
             with open(os.path.join(folder, "input", file), "w", encoding="utf-8") as f:
