@@ -16,7 +16,8 @@ cylinder_input.ratio, .ratio_of_one: the errors of the second and third over the
 cylinder_input.ratio_spread: standard deviation over the cameras of the ratio of one camera.
 cylinder_input.z_rms, .flat_z_rms, .z_rms_of_one: root mean square of the differences over their stated errors.
 cylinder_input.column_error: root mean square relative difference of the columns' radiances from renderings of flat cloth at their angles and
-at the true parameters, which holds the bend of the cloth, its texture and all errors of the chain; .column_z: the same over stated errors.
+at the true parameters, which holds the bend of the cloth, its texture, all errors of the chain and the noise of those renderings; .column_z: the
+same over the errors of both.
 """
 import argparse
 import hashlib
