@@ -86,40 +86,44 @@ const struct model_info *model_catalogue_find(const char *id)
     return NULL;
 }
 
+/* The i-th of n ids, NULL behind the last. */
+static const char *id_at(const char *const *id, size_t n, size_t i) { return i < n ? id[i] : NULL; }
+
+static bool is_among(const char *const *id, size_t n, const char *wanted)
+{
+    for (size_t i = 0; i < n; i++)
+        if (strcmp(id[i], wanted) == 0) return true;
+    return false;
+}
+
 const char *model_catalogue_with_speckle(size_t i)
 {
-    return i < sizeof with_speckle / sizeof *with_speckle ? with_speckle[i] : NULL;
+    return id_at(with_speckle, sizeof with_speckle / sizeof *with_speckle, i);
 }
 
 bool model_catalogue_has_speckle(const char *id)
 {
-    for (size_t i = 0; i < sizeof with_speckle / sizeof *with_speckle; i++)
-        if (strcmp(with_speckle[i], id) == 0) return true;
-    return false;
+    return is_among(with_speckle, sizeof with_speckle / sizeof *with_speckle, id);
 }
 
 const char *model_catalogue_with_modes(size_t i)
 {
-    return i < sizeof with_modes / sizeof *with_modes ? with_modes[i] : NULL;
+    return id_at(with_modes, sizeof with_modes / sizeof *with_modes, i);
 }
 
 bool model_catalogue_has_modes(const char *id)
 {
-    for (size_t i = 0; i < sizeof with_modes / sizeof *with_modes; i++)
-        if (strcmp(with_modes[i], id) == 0) return true;
-    return false;
+    return is_among(with_modes, sizeof with_modes / sizeof *with_modes, id);
 }
 
 const char *model_catalogue_with_flat_section(size_t i)
 {
-    return i < sizeof with_flat_section / sizeof *with_flat_section ? with_flat_section[i] : NULL;
+    return id_at(with_flat_section, sizeof with_flat_section / sizeof *with_flat_section, i);
 }
 
 bool model_catalogue_has_flat_section(const char *id)
 {
-    for (size_t i = 0; i < sizeof with_flat_section / sizeof *with_flat_section; i++)
-        if (strcmp(with_flat_section[i], id) == 0) return true;
-    return false;
+    return is_among(with_flat_section, sizeof with_flat_section / sizeof *with_flat_section, id);
 }
 
 const char *model_catalogue_near_field(size_t i)

@@ -1,7 +1,6 @@
 #include "optimizer/photographs/rows/column_errors.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 enum { MAX_COLUMN = 720, N = PHOTOGRAPH_PARTS, LEAST_PART = 4, REACH = 3 };
 static const double uneven_step = 0.25, most_alike = 0.5, least_alike = -0.4, of_second = 1.0 / 48.0,
